@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pinocchio
 import pytest
 
+from ir_description import ProgramStep, StepVia, cell_from_yaml, cell_to_yaml, load_cell
+from ir_msgs_py.report import MovementKind
 from ir_msgs_py.status import StatusCode
 from ir_planner import Planner, RequestError
+from ir_values.errors import CellFileError
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # the judge of poses
 from _pinocchio_arm import pinocchio_arm
@@ -179,3 +183,77 @@ def test_a_tolerance_that_is_no_number_is_refused(
 def test_places_that_are_no_list_are_refused(planners: dict[str, Planner], via: object) -> None:
     with pytest.raises(RequestError, match=r"via is .*: it must be a list"):
         planners["open"].plan_regional(goal="park", via=via)
+
+
+VIA_CELL = replace(
+    load_cell("open"),
+    program=(
+        ProgramStep("STATION", "p2"),
+        ProgramStep("STATION", "conv", via=StepVia(("park", "home"), tolerance=0.1)),
+        ProgramStep("POSTURE", "home", via=StepVia(("p1",), distance=0.05, tolerance=0.5)),
+    ),
+)
+
+
+@pytest.mark.parametrize("cycle_time", [0.0, 40.0])
+def test_steps_of_a_program_pass_their_places(cycle_time: float) -> None:
+    """Found and judged in the cell that its file says."""
+    cell = cell_from_yaml(cell_to_yaml(VIA_CELL), "via.yaml")
+    assert [step.via for step in cell.program] == [step.via for step in VIA_CELL.program]
+    plan = Planner(cell, clock=lambda: 0.0).plan_program(cycle_time=cycle_time)
+    assert plan.status.ok, plan.status
+    assert all(step.report.certified for step in plan.movements)
+    past = [step.trajectory for step in plan.movements if step.kind == MovementKind.REGIONAL]
+    postures = [np.array(cell.posture(name)) for name in ("park", "home")]
+    assert any(passes(motion, postures, 0.1) for motion in past)
+    model = pinocchio_arm(cell.robot, (), cell.base_pose)
+    data = model.createData()
+    place = np.linalg.inv(cell.base_pose) @ cell.station("p1").pose
+    last = past[-1].sample(np.linspace(0.0, past[-1].duration, 20_000)).q
+    away = []
+    for q in last:
+        pinocchio.forwardKinematics(model, data, q)
+        away.append(np.linalg.norm((data.oMi[6].act(cell.tcp[:3, 3])) - place[:3, 3]))
+    assert min(away) <= 0.05 + 1e-4
+    if cycle_time > 0.0:
+        assert plan.report.duration == pytest.approx(cycle_time, abs=1e-6)
+    else:
+        stopping = replace(VIA_CELL, program=STOPPING)
+        stops = Planner(stopping, clock=lambda: 0.0).plan_program()
+        assert plan.report.duration < stops.report.duration
+
+
+STOPPING = tuple(
+    ProgramStep(kind, name)
+    for kind, name in (
+        ("STATION", "p2"),
+        ("POSTURE", "park"),
+        ("POSTURE", "home"),
+        ("STATION", "conv"),
+        ("STATION", "p1"),
+        ("POSTURE", "home"),
+    )
+)
+
+
+def test_a_step_that_goes_nowhere_passes_nothing() -> None:
+    steps = (
+        ProgramStep("POSTURE", "home"),
+        ProgramStep("POSTURE", "home", via=StepVia(("park",))),
+    )
+    planner = Planner(replace(VIA_CELL, program=steps), clock=lambda: 0.0)
+    with pytest.raises(RequestError, match="step 2 passes park and goes nowhere"):
+        planner.plan_program()
+
+
+def test_a_cell_file_names_what_it_can_not_pass() -> None:
+    text = cell_to_yaml(VIA_CELL)
+    for good, bad, said in (
+        ("via: [p1]", "via: [p9]", "via place 'p9' is unknown"),
+        ("via: [p1]", "via: []", "via"),
+        ("via: [p1], ", "", "belongs to a step with via"),
+        ("via_distance: 0.05", "via_distance: 2", "2"),
+    ):
+        assert good in text
+        with pytest.raises(CellFileError, match=said):
+            cell_from_yaml(text.replace(good, bad), "via.yaml")

@@ -3,6 +3,10 @@ loading.
 """
 
 from ir_description.cell import (
+    VIA_DISTANCE_MAX,
+    VIA_MAX,
+    VIA_TOLERANCE,
+    VIA_TOLERANCES,
     AllowedContact,
     Cell,
     CellPath,
@@ -18,6 +22,7 @@ from ir_description.cell import (
     StateSwitch,
     Station,
     StepKind,
+    StepVia,
     Task,
     ToolTilt,
     Zone,
@@ -112,6 +117,10 @@ __all__ = [
     "ROBOTS",
     "TOOL_ACCELERATION_MAX",
     "TOOL_SPEED_MAX",
+    "VIA_DISTANCE_MAX",
+    "VIA_MAX",
+    "VIA_TOLERANCE",
+    "VIA_TOLERANCES",
     "AllowedContact",
     "Body",
     "Capsule",
@@ -142,6 +151,7 @@ __all__ = [
     "StateSwitch",
     "Station",
     "StepKind",
+    "StepVia",
     "Task",
     "ToolLimits",
     "ToolTilt",

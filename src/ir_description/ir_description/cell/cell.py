@@ -117,6 +117,9 @@ def check_step(
     """Return where the parts are after a step; refuse unknown names and what can't be done."""
     if step.kind == "STATION" and step.target not in stations:
         raise UnknownNameError("station", step.target, stations)
+    for place in step.via.places if step.via is not None else ():
+        if place not in (*stations, *POSTURES):
+            raise UnknownNameError("via place", place, (*stations, *POSTURES))
     if step.kind == "PATH" and step.target not in paths:
         raise UnknownNameError("path", step.target, paths)
     for signal in (*step.wait_for, *step.set_signals):

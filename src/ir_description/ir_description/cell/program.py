@@ -7,6 +7,7 @@ pause stays where the step before it ended.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
@@ -25,6 +26,14 @@ NUMBER_MAX = 8192
 """Highest number of an output or input at a KR C4."""
 PAUSE_MAX = 604_800.0
 """Longest pause or dwell [s]: a week."""
+VIA_MAX = 20
+"""Most places that one movement passes."""
+VIA_TOLERANCE = 0.05
+"""rad: how near each joint passes a place where nobody says."""
+VIA_TOLERANCES = 1e-6, math.pi
+"""rad"""
+VIA_DISTANCE_MAX = 1.0
+"""m"""
 VISITS = 3, 10
 """Fewest and most stations of a route: infeed, machines, outfeed."""
 
@@ -62,6 +71,23 @@ class CellSignal:
 
 
 @dataclass(frozen=True)
+class StepVia:
+    """places: stations and postures that a movement passes in this order, without a stop where that
+    is better: every joint within `tolerance` [rad] of a configuration of the place, or with
+    `distance` [m] above 0 the tcp within that and its orientation within `tolerance`.
+    """
+
+    places: tuple[str, ...]
+    tolerance: float = VIA_TOLERANCE
+    distance: float = 0.0
+
+    def __post_init__(self) -> None:
+        in_range(len(self.places), 1, VIA_MAX, "", "number of via places")
+        in_range(self.tolerance, *VIA_TOLERANCES, "rad", "via_tolerance")
+        in_range(self.distance, 0.0, VIA_DISTANCE_MAX, "m", "via_distance")
+
+
+@dataclass(frozen=True)
 class ProgramStep:
     """One step. target: a station's name, a posture ("home", "park"), a path's name, or "" for a
     pause.
@@ -71,6 +97,7 @@ class ProgramStep:
     whoever plans. planner: which search looks for the regional movement to the target, "": as the
     request says. carries: which of the cell's whole loads is carried from then on, "": as before.
     tilt: how far the tool may lean on the movement to the target, None: as it likes.
+    via: what the movement to the target passes, None: nothing.
     since: the signal that a pause is for, "": it is as long as it says; else it ends as long after
     that was set as planned, so that a late machine shifts what depends on it alone.
     """
@@ -87,6 +114,7 @@ class ProgramStep:
     carries: str = ""
     tilt: ToolTilt | None = None
     since: str = ""
+    via: StepVia | None = None
 
     def __post_init__(self) -> None:
         in_range(self.dwell, 0.0, PAUSE_MAX, "s", "dwell")
@@ -104,8 +132,8 @@ class ProgramStep:
             raise InvalidValueError("only a pause has a power mode, or ends after a signal")
         if self.kind == "PAUSE" and self.planner:
             raise InvalidValueError("a pause has no planner")
-        if self.kind not in ("STATION", "POSTURE") and self.tilt is not None:
-            raise InvalidValueError("only movements to stations and postures have a tilt")
+        if self.kind not in ("STATION", "POSTURE") and (self.tilt or self.via):
+            raise InvalidValueError("only movements to stations and postures have a tilt or a via")
         if self.kind != "STATION" and (self.attach or self.detach):
             raise InvalidValueError("parts are attached and detached at stations only")
         if self.attach and self.detach:

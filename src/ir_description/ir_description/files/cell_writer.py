@@ -21,6 +21,7 @@ from ir_description.cell import (
     ProgramStep,
     StateSwitch,
     Station,
+    StepVia,
     ToolTilt,
 )
 from ir_description.files.cell_reader import FORMAT
@@ -235,6 +236,8 @@ def _step(step: ProgramStep) -> str:
             fields.append(f"planner: {step.planner}")
         if step.tilt is not None:
             fields.append(_tilt(step.tilt))
+        if step.via is not None:
+            fields.append(_via(step.via))
     for key, part in (("attach", step.attach), ("detach", step.detach)):
         if part:
             fields.append(f"{key}: {part}")
@@ -242,6 +245,11 @@ def _step(step: ProgramStep) -> str:
         if signals:
             fields.append(f"{key}: {_signals(signals)}")
     return f"{{{', '.join(fields)}}}"
+
+
+def _via(via: StepVia) -> str:
+    near = f"via_tolerance: {_number(via.tolerance)}, via_distance: {_number(via.distance)}"
+    return f"via: [{', '.join(via.places)}], {near}"
 
 
 def _route(route: PartRoute) -> str:

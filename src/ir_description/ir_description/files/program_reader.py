@@ -11,12 +11,16 @@ from ir_description.cell import (
     PAUSE_MAX,
     PAUSE_POWER_MODES,
     POSTURES,
+    VIA_DISTANCE_MAX,
+    VIA_MAX,
+    VIA_TOLERANCES,
     VISITS,
     CellPath,
     CellSignal,
     NameRegister,
     PartRoute,
     ProgramStep,
+    StepVia,
     Task,
     check_posture,
 )
@@ -48,13 +52,17 @@ _STEP_KEYS = (
         "power_mode",
         "planner",
         "tilt",
+        "via",
+        "via_tolerance",
+        "via_distance",
         "since",
     ),
     *_COMMON,
 )
+_VIA = ("via", "via_tolerance", "via_distance")
 _KEYS = {
-    "station": ("station", "dwell", "attach", "detach", "planner", "tilt", *_COMMON),
-    "posture": ("posture", "dwell", "planner", "tilt", *_COMMON),
+    "station": ("station", "dwell", "attach", "detach", "planner", "tilt", *_VIA, *_COMMON),
+    "posture": ("posture", "dwell", "planner", "tilt", *_VIA, *_COMMON),
     "path": ("path", "dwell", "planner", *_COMMON),
     "pause": ("pause", "power_mode", "since", *_COMMON),
 }
@@ -133,8 +141,10 @@ def read_step(item: Item) -> ProgramStep:
         "planner": table["planner"].name() if "planner" in table else "",
     }
     tilt = read_tilt(table)
+    via = _via(table)
     if kind == "posture":
-        return ProgramStep("POSTURE", table["posture"].choice(POSTURES), tilt=tilt, **moving)
+        posture = table["posture"].choice(POSTURES)
+        return ProgramStep("POSTURE", posture, tilt=tilt, via=via, **moving)
     if kind == "path":
         return ProgramStep("PATH", table["path"].name(), **moving)
     return ProgramStep(
@@ -143,8 +153,27 @@ def read_step(item: Item) -> ProgramStep:
         attach=table["attach"].name() if "attach" in table else "",
         detach=table["detach"].name() if "detach" in table else "",
         tilt=tilt,
+        via=via,
         **moving,
     )
+
+
+def _via(table: Table) -> StepVia | None:
+    """What a movement passes; None where there is no `via`."""
+    limits = {
+        "tolerance": (*VIA_TOLERANCES, "rad"),
+        "distance": (0.0, VIA_DISTANCE_MAX, "m"),
+    }
+    given = {
+        name: table[f"via_{name}"].number(*bounds)
+        for name, bounds in limits.items()
+        if f"via_{name}" in table
+    }
+    if "via" not in table:
+        for name in given:
+            table[f"via_{name}"].fail("belongs to a step with via")
+        return None
+    return StepVia(tuple(item.name() for item in table["via"].list(1, VIA_MAX)), **given)
 
 
 def read_route(item: Item) -> PartRoute:

@@ -3,23 +3,25 @@
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol, TypeVar
 
+from ir_description import StepVia
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.search_log import SearchLog
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner import optimize
 from ir_planner.checks import Consumption, tilt_violation
-from ir_planner.errors import TimingError
+from ir_planner.errors import RequestError, TimingError
 from ir_planner.program.bounds import Rates
 from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Part
 from ir_planner.program.steps import Route
 from ir_planner.program.stops import Node
 from ir_planner.regional import Searches, search_regional
-from ir_planner.request import Context, Journal, Work
+from ir_planner.request import Context, Goal, Journal, Work, parse_goal
 from ir_planner.service import timed_service
 from ir_planner.timing import Movement, best_stretch, stretched
+from ir_planner.trajectories import Via, search_via
 from ir_values.arrays import FloatArray
 
 # Movements that are known, made again for another value of a second: near the path of one, from
@@ -239,7 +241,8 @@ class Movements:
         ends = (
             lines if part.kind != ACROSS else (first.departure.tobytes(), second.arrival.tobytes())
         )
-        kind = part.kind if part.kind != ACROSS else f"{part.kind} {self._planner(part)}"
+        step = self.route.at(part.hop).step
+        kind = part.kind if part.kind != ACROSS else f"{part.kind} {self._planner(part)} {step.via}"
         return id(self.route.arriving(part.hop)), kind, names, ends
 
     def _planner(self, part: Part) -> str:
@@ -279,16 +282,44 @@ class Movements:
 
     def _across(self, part: Part, context: Context) -> Movement | Failure:
         known = _known(self._near.across, part)
-        if known and (again := optimised_near(known, context)) is not None:
-            return again
-        first, second = self.ends(part)
         asked = context.planned_by(self._planner(part))
-        status, found = search_regional(first, second, asked, self.searches)
+        via = self.route.at(part.hop).step.via
+        if via is not None:
+            status, found = self._past_places(part, via, asked)
+            slower = slowed_near(known, context)  # a descent could miss a place
+            if slower is not None and (found is None or slower.cost < found.cost):
+                return slower
+        else:
+            if known and (again := optimised_near(known, context)) is not None:
+                return again
+            status, found = search_regional(*self.ends(part), asked, self.searches)
         self._logs[self._key(part)] = context.journal.logs
         here = self.route.name(part.hop - 1)
         there = self.route.name(part.hop)
         what = f"from {here or 'the start'} to {there}"
         return found or Failure(Status(status.code, f"{what}: {status.message}"))
+
+    def _past_places(
+        self, part: Part, via: StepVia, context: Context
+    ) -> tuple[Status, Movement | None]:
+        """The movement past the places of a step; each leg gets the same share of the work."""
+        first, second = self.ends(part)
+        cell = self.route.scenes.cell
+        places = tuple(parse_goal(name, cell, "via") for name in via.places)
+        work = context.work
+        share = work.left // (len(places) + 2)
+        improvement = work.improvement // (len(places) + 2)
+
+        def leg() -> Context:
+            own = Work(share, work.deadline, work.clock, work.cancelled, improvement, work.threads)
+            return replace(context, journal=Journal(own, context.journal.seed))
+
+        asked = Via(places, via.tolerance, via.distance)
+        goal = Goal(configuration=second)
+        try:
+            return search_via(first, asked, goal, context, leg, self.searches)
+        except RequestError as error:  # none of what was found is certified
+            return error.status, None
 
     def _along_line(self, part: Part, context: Context) -> Movement | Failure:
         entry = part.kind == ENTER

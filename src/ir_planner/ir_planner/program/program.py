@@ -301,6 +301,13 @@ def prepared(request: ProgramRequest, journal: Journal) -> tuple[Route, Context]
     route = Route.over(steps, scenes)
     for place in range(len(route)):
         context.leaning_by(route.tilt(place))  # one that can't be kept is refused here
+    for k, placed in enumerate(steps):
+        if placed.step.via is not None and k not in route.stops:
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"step {k + 1} passes {', '.join(placed.step.via.places)} and goes nowhere: the "
+                f"step before it ends at {placed.step.target} already",
+            )
     return route, context
 
 

@@ -2,7 +2,7 @@
 
 from ir_planner.trajectories.optimization import OptimizationPlan, optimize_trajectory
 from ir_planner.trajectories.through_points import POINTS_MAX, Reference, plan_through
-from ir_planner.trajectories.via import VIA_TOLERANCE, Via, plan_via
+from ir_planner.trajectories.via import VIA_TOLERANCE, Via, plan_via, search_via
 
 __all__ = [
     "POINTS_MAX",
@@ -13,4 +13,5 @@ __all__ = [
     "optimize_trajectory",
     "plan_through",
     "plan_via",
+    "search_via",
 ]

@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ir_description import VIA_DISTANCE_MAX, VIA_MAX, VIA_TOLERANCE, VIA_TOLERANCES
 from ir_kernels import portable
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
@@ -29,10 +30,6 @@ from ir_planner.timing import Movement, check_requested, distinct, straight_step
 from ir_planner.trajectories.through_points import best_along
 from ir_values.arrays import FloatArray
 
-VIA_MAX = 20
-VIA_TOLERANCE = 0.05  # rad: where a request names none, as in the message
-TOLERANCE_MAX = float(np.pi)  # rad
-DISTANCE_MAX = 1.0  # m
 _CORNERS = 30  # of straight steps that are blended
 _CONFIGURATIONS = 12  # of a pose that are looked at
 _STEP = 1e-3  # s between the instants at which places are looked for
@@ -58,8 +55,8 @@ class Via:
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
                 f"via has {len(self.places)} places: at most {VIA_MAX} are passed",
             )
-        tolerance = bounded(self.tolerance, 1e-6, TOLERANCE_MAX, "via_tolerance", "rad")
-        distance = bounded(self.distance, 0.0, DISTANCE_MAX, "via_distance", "m")
+        tolerance = bounded(self.tolerance, *VIA_TOLERANCES, "via_tolerance", "rad")
+        distance = bounded(self.distance, 0.0, VIA_DISTANCE_MAX, "via_distance", "m")
         object.__setattr__(self, "tolerance", tolerance)
         object.__setattr__(self, "distance", distance)
 
@@ -111,7 +108,27 @@ def plan_via(
     """Movement from start (n,) past all places to a goal. leg_context: of a leg, with work of its
     own. Raises RequestError, CancelledError when asked to stop.
     """
-    return _Passing(start, via, goal, context, leg_context, searches).plan()
+    journal = context.journal
+    journal.planner_id = "via"
+    journal.timing = "synchronous"
+    passing = _Passing(start, via, goal, context, leg_context, searches)
+    status, found = passing.search()
+    info = journal.info(passing.start, context.joint_names)
+    if found is None:
+        return MovementPlan(status, info, TrajectoryReport())
+    return MovementPlan(status, info, found.report, found.trajectory, found.path)
+
+
+def search_via(
+    start: FloatArray,
+    via: Via,
+    goal: Goal,
+    context: Context,
+    leg_context: Callable[[], Context],
+    searches: Searches,
+) -> tuple[Status, Movement | None]:
+    """The same as a movement, None where the status says why there is none."""
+    return _Passing(start, via, goal, context, leg_context, searches).search()
 
 
 class _Passing:
@@ -135,18 +152,16 @@ class _Passing:
         self.leg_context = leg_context
         self.searches = searches
 
-    def plan(self) -> MovementPlan:
-        """The answer."""
+    def search(self) -> tuple[Status, Movement | None]:
+        """The cheapest movement that is found, None where the status says why there is none."""
         journal = self.context.journal
-        journal.planner_id = "via"
-        journal.timing = "synchronous"
         chosen = self._chain()
         if isinstance(chosen, Status):
-            return self._refused(chosen)
+            return chosen, None
         with journal.stage("legs") as notes:
             legs = self._legs(chosen)
             if isinstance(legs, Status):
-                return self._refused(legs)
+                return legs, None
             stopping = self._stopping(legs)
             notes.append(f"{stopping.trajectory.duration:.3f} s with a stop at each place")
         best = None
@@ -163,8 +178,7 @@ class _Passing:
         text = ", ".join(f"{t:.3f} s" for t in times)
         stops = "" if answer is best else ", with a stop at each"
         journal.note("via", f"passed at {text}{stops}")
-        info = journal.info(self.start, self.context.joint_names)
-        return MovementPlan(Status.success(), info, answer.report, answer.trajectory, answer.path)
+        return Status.success(), answer
 
     def _best(self, stopping: Movement, best: Movement | None) -> Movement | None:
         """The cheaper one of both that is certified and not too long."""
@@ -188,10 +202,6 @@ class _Passing:
         violation = stopping.violation
         why = "nothing is certified" if violation is None else violation.sentence
         return RequestError(StatusCode.INVALID_MOTION_PLAN, f"via: {why}")
-
-    def _refused(self, status: Status) -> MovementPlan:
-        info = self.context.journal.info(self.start, self.context.joint_names)
-        return MovementPlan(status, info, TrajectoryReport())
 
     def _chain(self) -> FloatArray | Status:
         """Configurations (V + 2, n) of start, places and goal that are cheapest together by W."""
