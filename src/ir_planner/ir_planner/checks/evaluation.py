@@ -100,6 +100,7 @@ def measured(
 ) -> Evaluation:
     """The evaluation of a trajectory that has been verified, and whose energy is known."""
     clearance = clearance_profile(trajectory, scene, station)
+    tool_speed, tool_acceleration = verification.tool_motion
     report = TrajectoryReport(
         duration=trajectory.duration,
         movement_cost=float(portable.matmul(verification.travel, scene.weights)),
@@ -121,8 +122,8 @@ def measured(
         contacts=clearance.contacts,
         torque_reserve=_reserve(verification.torque, scene),
         largest_tilt=_largest_tilt(trajectory, cone, verification),
-        tool_speed=verification.tool_speed,
-        tool_acceleration=verification.tool_acceleration,
+        tool_speed=tool_speed,
+        tool_acceleration=tool_acceleration,
     )
     return Evaluation(report, verification, clearance, energy)
 

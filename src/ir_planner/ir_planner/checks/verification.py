@@ -5,6 +5,7 @@ every kind is named with place, limit and excess.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -356,9 +357,8 @@ def leans(tilt: float, cone: ToolCone, where: str) -> str:
 @dataclass(frozen=True, eq=False)
 class Verification:
     """violation: the first one, None: everything is proved; others: the first of every other kind,
-    in the order of their times. Largest used shares of the limits, each (n,). tool_speed [m/s],
-    tool_acceleration [m/s^2]: bounds at the tcp; of every point of tool and part where those are
-    limited.
+    in the order of their times. Largest used shares of the limits, each (n,). use: how fast the
+    tool is.
     """
 
     violation: Violation | None
@@ -367,9 +367,15 @@ class Verification:
     jerk: FloatArray
     torque: FloatArray
     travel: FloatArray
-    others: tuple[Violation, ...] = ()
-    tool_speed: float = 0.0
-    tool_acceleration: float = 0.0
+    others: tuple[Violation, ...]
+    use: ToolUse
+
+    @cached_property
+    def tool_motion(self) -> tuple[float, float]:
+        """Bounds of speed [m/s] and acceleration [m/s^2] at the tcp; of every point of tool and
+        part where those are limited. Found when they are asked for: of most movements nobody does.
+        """
+        return (self.use.whole if self.use.bounds.whole.asked else self.use.tcp).most()
 
     @property
     def certified(self) -> bool:
@@ -470,7 +476,7 @@ def verified(
         torque.upper,
         largest.travel.sum(axis=0),
         tuple(violations[1:]),
-        *(use.whole if use.bounds.whole.asked else use.tcp).most(),
+        use,
     )
 
 
