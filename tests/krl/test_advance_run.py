@@ -218,3 +218,16 @@ def test_the_tool_of_a_program_is_what_the_distance_is_of(planner: Planner) -> N
         exact = moving(planner, replace(program, commands=tuple(still)))
         assert seconds[-1] < sum(one.trajectory.duration for one in exact)
     assert seconds[0] < seconds[1]
+
+
+@pytest.mark.parametrize(
+    ("between", "said"),
+    [("", True), ("WAIT SEC 0\n", False), ("$ADVANCE=0\nPTP {A1 3}\n", False)],
+)
+@pytest.mark.parametrize("setting", ["$OV_PRO=50", "BAS(#OV_PRO,50)"])
+def test_an_override_that_the_advance_run_sets_over_motions_is_said(
+    followed: Follow, between: str, said: bool, setting: str
+) -> None:
+    """$OV_PRO acts when it is set, on a motion that is still driven as well."""
+    notes = followed(f"PTP {{A1 0}}\n{between}{setting}\nPTP {{A1 5}}").notes
+    assert any("acts at once, on motions before" in note.text for note in notes) is said

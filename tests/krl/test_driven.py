@@ -113,6 +113,54 @@ def test_an_arc_in_a_spline_is_the_circle(planner: Planner, followed: Follow, an
         np.testing.assert_allclose(np.linalg.norm(found - centre, axis=1), 0.1, atol=1e-5)
 
 
+@given(st.integers(1, 100), st.integers(1, 100))
+@settings(max_examples=8, deadline=None)
+def test_the_axes_percentages_do_not_slow_a_lin(
+    planner: Planner, velocity: int, acceleration: int
+) -> None:
+    """Law: $VEL_AXIS and $ACC_AXIS are of axis motions; LIN has $VEL.CP and $ACC.CP alone."""
+
+    def seconds(axes: str) -> float:
+        lines = f"{START}{axes}$VEL.CP=0.25\nLIN_REL {{X 100,Z -100}}"
+        texts = [parse(f"DEF TEST( )\n{lines}\nEND\n", "test.src")]
+        program = follow(texts, planner.cell.machine_home, tool_in_flange(planner.cell.tcp))
+        (trajectory,) = steps_of(program, planner)
+        return float(trajectory.duration)
+
+    set_to = (f"$VEL_AXIS[{j}]={velocity}\n$ACC_AXIS[{j}]={acceleration}\n" for j in range(1, 7))
+    assert seconds("".join(set_to)) == seconds("")
+
+
+@pytest.mark.parametrize("angle", [45, 90, 270, -90])
+@pytest.mark.parametrize("block", [False, True])
+def test_the_orientation_of_an_scirc_with_an_angle_is_of_its_programmed_end(
+    planner: Planner, followed: Follow, angle: int, block: bool
+) -> None:
+    """As $CIRC_MODE has it when nobody sets it: the turn goes on at its rate, 20 deg in 180."""
+    begin = START + "PTP {X 1500,Y 0,Z 1200,A 0,B 90,C 0}\n"
+    circle = f"SCIRC {{X 1500,Y 100,Z 1300}},{{X 1500,Y 200,Z 1200,A 20,B 90,C 0}},CA {angle}"
+    text = f"SPLINE\n{circle}\nENDSPLINE" if block else circle
+    trajectory = steps_of(followed(begin + text), planner)[-1]
+    first, last = planner.scene("none").chain.tcp_poses(trajectory.positions[[0, -1]])[:, :3, :3]
+    turned = np.degrees(np.arccos((np.trace(first.T @ last) - 1.0) / 2.0))
+    assert turned == pytest.approx(abs(angle) / 9.0, abs=1e-3)
+
+
+def test_an_scirc_that_would_turn_the_tool_too_far_is_refused(
+    planner: Planner, followed: Follow
+) -> None:
+    begin = START + "PTP {X 1500,Y 0,Z 1200,A 0,B 90,C 0}\n"
+    circle = "SCIRC {X 1500,Y 100,Z 1300},{X 1500,Y 200,Z 1200,A 100,B 90,C 0},CA 350"
+    with pytest.raises(KrlMotionError, match="turns by 194 deg; at most 180"):
+        steps_of(followed(begin + circle), planner)
+
+
+def test_a_relative_motion_ignores_status_and_turn(planner: Planner, followed: Follow) -> None:
+    (plain,) = steps_of(followed(START + "PTP_REL {Z 100}"), planner)
+    (other,) = steps_of(followed(START + "PTP_REL {Z 100,S 6,T 21}"), planner)
+    assert other.positions[-1] == pytest.approx(plain.positions[-1])
+
+
 def test_ca_sets_the_angle_of_a_circ(planner: Planner, followed: Follow) -> None:
     (trajectory,) = steps_of(followed(START + "CIRC_REL {Y 200,Z 200},{Y 400,Z 0}, CA 90"), planner)
     ends = planner.scene("none").chain.tcp_poses(trajectory.positions[[0, -1]])[:, :3, 3]

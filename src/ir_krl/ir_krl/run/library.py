@@ -161,6 +161,7 @@ class Library:
             case "ACC_CP":
                 self._tool_acceleration(amount())
             case "OV_PRO":
+                self._memory.override_set(place)
                 self._set("$OV_PRO", amount())
             case "FRAMES":
                 self._frames(place)

@@ -57,7 +57,7 @@ class Memory:
     by name or name[index]; chosen: the same of $TOOL and $BASE that a function has just found;
     noted: hears of those that are used; guesses: how many were; watched: see `watch`. settings:
     what a user has set, which variables of a call begin with too; beside: what triggers have set
-    since the advance run stopped last.
+    since the advance run stopped last; ahead: it is ahead of a motion since then.
     """
 
     shared: dict[str, Value]
@@ -72,6 +72,7 @@ class Memory:
     listed: set[str] = field(default_factory=set)
     settings: dict[str, Value] = field(default_factory=dict)
     beside: set[str] = field(default_factory=set)
+    ahead: bool = False
     types: dict[str, Mapping[str, str]] = field(default_factory=lambda: dict(TYPES))
 
     def enter(self, values: dict[str, Value], names: Iterable[str]) -> None:
@@ -196,6 +197,20 @@ class Memory:
         for name in self.beside:
             self.assumed.pop(name, None)
         self.beside.clear()
+        self.ahead = False
+
+    def moved(self) -> None:
+        """A motion is handed on, while the advance run goes ahead of it."""
+        self.ahead = self.peek("$ADVANCE") != 0
+
+    def override_set(self, place: Place) -> None:
+        """Say that $OV_PRO, which acts at once, is set while motions before are still driven."""
+        if self.ahead:
+            text = (
+                "$OV_PRO is set by the advance run and acts at once, on motions before as well: "
+                "taken as set when they end; put WAIT SEC 0 before"
+            )
+            self.noted(place, text, Effect.SPEEDS)
 
     def _guessed(self, name: str, index: tuple[int, ...] | None, place: Place) -> None:
         """Say that a value which isn't the program's is used."""

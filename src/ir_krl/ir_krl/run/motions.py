@@ -153,6 +153,8 @@ class Assigning(Control):
         """
         if name == ANALOG_OUTPUT:
             self.stop(where, ANALOG_OUTPUT)
+        if name == "$OV_PRO":
+            self.memory.override_set(where)
         if name == "$IPO_MODE" and value not in (Symbol("BASE"), Symbol("TCP")):
             raise KrlRunError(f"$IPO_MODE is {kind_of(value)}: it is #BASE or #TCP", where)
         known = MODELLED | HARMLESS | SITUATION.keys()
@@ -277,7 +279,7 @@ class Motions:
         return Motion(
             kind,
             end,
-            self.speeds(place, spline=spline),
+            self.speeds(place, spline=spline, axis=kind == "ptp" or spline),
             place,
             blend,
             via,
@@ -315,8 +317,10 @@ class Motions:
             )
         for variable in () if relative else ("$TOOL", "$BASE"):
             self._memory.get(((variable, None),), place)  # says what is assumed of it
-        status, turn = (
-            integer(value.fields[part], part, place) if part in value.fields else None
+        status, turn = (  # a relative motion ignores them
+            integer(value.fields[part], part, place)
+            if part in value.fields and not relative
+            else None
             for part in ("S", "T")
         )
         return Target(
@@ -364,12 +368,13 @@ class Motions:
         base, tool = (pose(Structure({}) if one is None else one, n, place) for n, one in found)
         return base, tool
 
-    def speeds(self, place: Place, *, spline: bool = False) -> Speeds:
+    def speeds(self, place: Place, *, spline: bool, axis: bool) -> Speeds:
         """How fast the system variables say, of a motion of the `spline` kind or of the other;
-        each bounded by what a controller takes.
+        each bounded by what a controller takes. axis: $VEL_AXIS and $ACC_AXIS count, as they don't
+        for LIN and CIRC.
         """
         velocity, acceleration = (
-            tuple(self._share(name, (j,), place) for j in range(1, AXES + 1))
+            tuple(self._share(name, (j,), place) if axis else 1.0 for j in range(1, AXES + 1))
             for name in ("$VEL_AXIS", "$ACC_AXIS")
         )
         return Speeds(
@@ -576,6 +581,7 @@ class Moving(Assigning):
         self._act(one for one in due if one.switch.ahead)
         built = self._with_settings(tree, lambda: self._motions.motion(tree))
         self.commands.append(self._in_advance(built))
+        self.memory.moved()
         self._signals.moved()
         self._act(one for one in due if not one.switch.ahead)
 
@@ -631,6 +637,7 @@ class Moving(Assigning):
         late = [one for one in made if one not in early]
         self.commands += [_ahead(one) for one in reversed(early)]
         self.commands += [block, *late]
+        self.memory.moved()
         self._signals.moved()
         self._act(one for one in due if not one.switch.ahead)
 

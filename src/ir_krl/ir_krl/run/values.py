@@ -66,8 +66,9 @@ class Array:
         if not self.sizes:
             return
         declared = ", ".join(map(str, self.sizes))
-        if len(index) != len(self.sizes) or any(
-            one > size for one, size in zip(index, self.sizes, strict=True)
+        row = self.kind == "CHAR" and len(index) == len(self.sizes) - 1  # NAME[1,] is a text
+        if len(index) != len(self.sizes) - row or any(
+            one > size for one, size in zip(index, self.sizes, strict=False)
         ):
             raise KrlRunError(
                 f"{name}[{written}] isn't in {name}[{declared}] as it is declared: a controller "
@@ -227,6 +228,8 @@ def typed(kind: str, value: Value, types: Types) -> Value:
             return Array(held_at, kind or value.kind, value.sizes)
         case int() | float() if not isinstance(value, bool):
             return _number_as(kind, value)
+        case str() if kind == "INT" and len(value) == 1:  # a CHAR
+            return ord(value)
     return value
 
 

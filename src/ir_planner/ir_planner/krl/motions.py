@@ -109,10 +109,29 @@ def drawn_from(motion: Motion, first: FloatArray, arm: Arm) -> tuple[FloatArray,
         last[:3, :3] = first[:3, :3]
     if motion.via is None:
         return last, Line(first[:3, 3], last[:3, 3])
-    arc = arc_through(first[:3, 3], arm.pose(motion.via, first)[:3, 3], last[:3, 3], motion.angle)
+    places = (first[:3, 3], arm.pose(motion.via, first)[:3, 3], last[:3, 3])
+    arc = arc_through(*places, motion.angle)
     if arc is None:
         raise KrlMotionError("CIRC: start, auxiliary point and end lie on a line", motion.place)
+    if motion.spline and motion.angle is not None:  # the programmed end has its orientation there
+        programmed = arc_through(*places)
+        assert programmed is not None  # as the arc to the angle
+        last[:3, :3] = _turned_on(first, last, motion.angle / programmed.angle, motion)
     return last, arc
+
+
+def _turned_on(first: FloatArray, last: FloatArray, share: float, motion: Motion) -> FloatArray:
+    """The rotation (3, 3) at a share of the turn between two poses (4, 4). Raises KrlMotionError
+    where that is no shortest turn.
+    """
+    turning = abs(share) * float(turn_of(portable.matmul(first[:3, :3].T, last[:3, :3])))
+    if turning > np.pi:
+        raise KrlMotionError(
+            f"{_name(motion)}: up to its angle the tool turns by {np.degrees(turning):.0f} deg; at "
+            "most 180 are read, write two circles",
+            motion.place,
+        )
+    return np.asarray(turned_evenly(first[:3, :3], last[:3, :3], np.array([share]))[0])
 
 
 def tool_curve(motion: Motion, start: FloatArray, arm: Arm) -> AxisCurve:
