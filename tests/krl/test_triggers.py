@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ir_description import cell_from_yaml, cell_to_yaml, load_cell
-from ir_krl import Followed, KrlError, follow, parse
+from ir_krl import Followed, KrlError, SetOutput, follow, parse
 from ir_planner import Planner, RequestError
 from ir_planner.before_after.today import today_of_krl
 from ir_planner.krl import evaluate_krl, tool_in_flange
@@ -392,3 +392,17 @@ def test_triggers_change_no_motion(seed: int) -> None:
 def test_a_trigger_without_a_motion_is_said(followed: Follow) -> None:
     program = followed("PTP XHOME\nTRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE")
     assert any("it never acts" in note.text for note in program.notes)
+
+
+def test_a_trigger_acts_as_a_statement_of_its_own_file(home: np.ndarray) -> None:
+    """Its motion may stand in another module: variables and routines are those of the trigger's."""
+    main = "DEF MAIN( )\nPTP {A1 0}\nARM( )\nPTP {A1 9}\nEND\nDEF SHOT( )\n$OUT[8]=TRUE\nEND\n"
+    arm = "DEF ARM( )\nTRIGGER WHEN DISTANCE=0 DELAY=0 DO SHOT( )\nEND\n"
+    sub = f"{arm}DEF SHOT( )\n$OUT[N]=TRUE\nEND\n"
+    data = "DEFDAT ARM\nINT N=4\nENDDAT\n"
+    texts = [parse(main, "main.src"), parse(sub, "arm.src"), parse(data, "arm.dat")]
+    (output,) = [
+        one for one in follow(texts, home, np.eye(4)).commands if isinstance(one, SetOutput)
+    ]
+    assert output.number == 4
+    assert (output.place.file, output.place.line) == ("arm.src", 5)

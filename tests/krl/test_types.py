@@ -210,3 +210,12 @@ def test_two_modules_have_variables_of_one_name() -> None:
     (wait,) = follow(texts, *ROBOT).commands
     assert isinstance(wait, Wait)
     assert wait.seconds == 2
+
+
+def test_rows_of_texts_are_set_as_every_configuration_sets_them(followed: Follow) -> None:
+    """TOOL_NAME[1,]: the text of a row, within the rows that are declared."""
+    data = 'DECL CHAR NAMES[3,24]\nNAMES[1,]="gear"\nNAMES[3,]="none"'
+    program = followed("WAIT SEC STRLEN(NAMES[1,])", data)
+    assert [one.seconds for one in program.commands if isinstance(one, Wait)] == [4.0]
+    with pytest.raises(KrlRunError, match=r"NAMES\[4\] isn't in NAMES\[3, 24\]"):
+        followed('NAMES[4,]="gear"', data)

@@ -20,6 +20,7 @@ from ir_krl.run.memory import (
     Signals,
     Step,
     Watched,
+    module_of,
 )
 from ir_krl.run.notes import Effect, Note
 from ir_krl.run.values import Unknown, Value, integer
@@ -98,6 +99,11 @@ class Control:
     _flags: dict[int, Tree] = field(default_factory=dict)  # what cyclical flags are set to
     _said: dict[tuple[str, Effect], int] = field(default_factory=dict)  # where among the notes
     _places: dict[int, set[Place]] = field(default_factory=dict)  # of a note that is said again
+
+    def _at(self, file: str) -> None:
+        """Statements of this file run from here on."""
+        self.expressions.file = file
+        self.memory.module = module_of(file)
 
     def body(self, body: Tree) -> None:
         """Run all statements of a body; jumps to its labels are followed."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import PurePath
 from typing import Any
 
 from ir_krl.errors import KrlRunError, Place
@@ -30,6 +31,12 @@ from ir_krl.run.values import (
 #
 # A module is a .src with its .dat. A variable of a data list is known in its module, one that is
 # GLOBAL or stands in $CONFIG everywhere; where two have the same name the nearest one counts.
+
+
+def module_of(file: str) -> str:
+    """The module that a file belongs to: a .src and its .dat have one."""
+    return PurePath(file).stem.upper()
+
 
 Step = tuple[str, tuple[int, ...] | None]
 """A name and, where one is written, its index."""

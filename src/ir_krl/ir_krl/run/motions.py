@@ -519,10 +519,11 @@ _MS = 1e-3  # s
 
 @dataclass(frozen=True, eq=False)
 class _Trigger:
-    """A TRIGGER that waits for its motion."""
+    """A TRIGGER that waits for its motion; its action is a statement of `file`."""
 
     switch: Switch
     action: Tree
+    file: str
 
     def of_part(self, part: int) -> _Trigger:
         """The same of a part of a spline."""
@@ -559,7 +560,7 @@ class Moving(Assigning):
         begins = from_start is not None if along else at == 0.0
         seconds = _MS * self.expressions.number(delay, "DELAY")
         switch = Switch(begins, begins, _MM * at if along else None, seconds, self._part)
-        self._triggers.append(_Trigger(switch, action))
+        self._triggers.append(_Trigger(switch, action, self.expressions.file))
         if priority is not None and action.data == "call":
             level = self.expressions.number(priority, "PRIO")
             text = (
@@ -571,7 +572,8 @@ class Moving(Assigning):
     def without_motion(self) -> None:
         """Note the triggers behind which no motion stands."""
         for one in self._triggers:
-            self.note(one.action, "a TRIGGER with no motion behind it: it never acts")
+            place = place_of(one.action, one.file)
+            self.note_at(place, "a TRIGGER with no motion behind it: it never acts")
 
     def _ptp(self, tree: Tree) -> None:
         if self._not_beside(tree):
@@ -604,10 +606,13 @@ class Moving(Assigning):
 
     def _act(self, due: Iterable[_Trigger]) -> None:
         """What triggers do while the robot moves."""
+        here = self.expressions.file
         for one in due:
             self.continuing = True
             self.triggered = one.switch
+            self._at(one.file)
             getattr(self, f"_{one.action.data}")(one.action)
+        self._at(here)
         self.continuing = False
         self.triggered = None
 

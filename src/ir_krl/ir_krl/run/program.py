@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import PurePath
 from typing import Any
 
 from ir_krl.errors import KrlMotionError, KrlRunError, Place
@@ -13,7 +12,7 @@ from ir_krl.run.commands import Command
 from ir_krl.run.control import Endless, Jump, LoopExit, Returned
 from ir_krl.run.expressions import Expressions
 from ir_krl.run.library import COMPUTED, CONTROLLERS, FILLING, STOPPING, Library
-from ir_krl.run.memory import Memory, SignalRange, Signals
+from ir_krl.run.memory import Memory, SignalRange, Signals, module_of
 from ir_krl.run.motions import Motions, Moving
 from ir_krl.run.notes import Effect, Note, worst_first
 from ir_krl.run.standing import AXES_NOW, PLACE_NOW, Kinematics, Standing
@@ -23,11 +22,6 @@ from ir_krl.run.values import TYPES, Array, Unknown, Value, copied, typed
 from ir_values.arrays import FloatArray
 
 # Routines of several files: those of the same file come first, as on the controller.
-
-
-def module_of(file: str) -> str:
-    """The module that a file belongs to: a .src and its .dat have one."""
-    return PurePath(file).stem.upper()
 
 
 class Routines:
@@ -271,11 +265,6 @@ class _Run(Moving):
             memory.hold(name, self.standing.axes())
         elif name in PLACE_NOW:
             memory.hold(name, self.standing.place(self._motions.here(name, place)))
-
-    def _at(self, file: str) -> None:
-        """Statements of this file run from here on."""
-        self.expressions.file = file
-        self.memory.module = module_of(file)
 
     def routine(self, routine: Routine, arguments: list[Value | None], place: Place) -> Value:
         """Run a routine; the value of its RETURN, 0 without one. OUT parameters are read by the
