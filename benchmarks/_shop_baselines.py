@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from _results import Claim, at_least, line_of
+from _shop_round_trip import STOPPED
 
 from ir_cli.trace_programs import today_of_trace
 from ir_krl import follow, parse
@@ -141,7 +142,7 @@ def _rows(name: str, run: Any) -> list[Row]:
 
 
 def _planner(cell: str) -> Planner:
-    return Planner(cell)
+    return Planner(cell, clock=STOPPED)
 
 
 def _common(cycle_time: float) -> BeforeAfter:

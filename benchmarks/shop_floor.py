@@ -24,7 +24,7 @@ from _second_opinion import SecondOpinion
 from _shop_baselines import baselines
 from _shop_corpus import corpus
 from _shop_hidden import PROGRAMS, QUICK_PROGRAMS, hidden_truths
-from _shop_round_trip import DRAWN, QUICK_DRAWN, round_trips
+from _shop_round_trip import DRAWN, QUICK_DRAWN, STOPPED, round_trips
 from _shop_traces import traces
 
 from ir_description import bundled_cells, load_cell
@@ -156,7 +156,7 @@ def main() -> None:
     rows: list[Row] = []
     for cell in arguments.cell or CELLS:
         load_cell(cell)
-        planner = Planner(cell)
+        planner = Planner(cell, clock=STOPPED)
         for seed in range(seeds):
             row = row_of(cell, seed, planner)
             if row is not None:
