@@ -348,7 +348,7 @@ def scene(*things: Any, is_diff: bool = True, **fields: Any) -> Any:
         "is_diff": is_diff,
         "robot_model_name": "",
         "fixed_frame_transforms": (),
-        "allowed_collision_matrix": Of(entry_names=(), default_entry_names=()),
+        "allowed_collision_matrix": Of(entry_names=(), entry_values=(), default_entry_names=()),
         "robot_state": state(),
         "link_padding": (),
         "link_scale": (),

@@ -137,6 +137,8 @@ GONE = 10.0
 """s without anybody who offers an action before its goal is given up. The middleware forgets a
 process that died, or was stopped, after 5 s.
 """
+LOOK = 0.02
+"""s between two looks whether a goal is to be canceled."""
 
 
 class GoalSender:
@@ -155,9 +157,10 @@ class GoalSender:
         response_timeout: float,
         result_timeout: float,
         cancel_grace: float,
+        give_up: Callable[[], bool] | None = None,
     ) -> Any:
-        """Send the goal and return its result; cancel it on timeout [s] and on an exception while
-        waiting.
+        """Send the goal and return its result; cancel it on timeout [s], on an exception while
+        waiting, and when `give_up` says so: then the result is that of the canceled goal.
         """
         action_type = owner_of(goal, "Goal", "action")
         client = self._executor.run(lambda: self._client(action, action_type))
@@ -176,6 +179,8 @@ class GoalSender:
             raise RequestRefusedError(f"{action} rejected the goal", int(StatusCode.FAILURE))
         result: Future = self._executor.run(handle.get_result_async)
         try:
+            if give_up is not None and not self._awaited(client, result, give_up):
+                self._executor.run(handle.cancel_goal_async)
             if self._ended(action, client, result, result_timeout):
                 self._executor.run(
                     _nothing
@@ -199,6 +204,13 @@ class GoalSender:
         for client in self._clients.values():
             client.destroy()
         self._clients.clear()
+
+    def _awaited(self, client: ActionClient, result: Future, give_up: Callable[[], bool]) -> bool:
+        """Whether the goal's result comes, or its node goes, before the goal is given up."""
+        while not self._executor.wait(result, LOOK) and client.server_is_ready():
+            if give_up():
+                return False
+        return True
 
     def _ended(self, action: str, client: ActionClient, result: Future, timeout: float) -> bool:
         """Whether the goal's result has come within `timeout` [s]; raises where its node has
@@ -421,13 +433,17 @@ class Client:
         goal: Any,
         feedback: Callable[[Any], object] | None = None,
         timeout: float = float("inf"),
+        give_up: Callable[[], bool] | None = None,
     ) -> Any:
         """Send a goal (a `RunProgram.Goal(...)`) and return its result; Ctrl-C cancels the goal.
 
         timeout: for the result [s]; the goal is canceled when it is over and CallTimedOutError
-        raised.
+        raised. give_up: asked meanwhile; when it is true the goal is canceled, and its result
+        returned.
         """
-        return self._goals.send(action, goal, feedback, self.timeout, timeout, _CANCEL_GRACE)
+        return self._goals.send(
+            action, goal, feedback, self.timeout, timeout, _CANCEL_GRACE, give_up
+        )
 
     def subscribe(self, topic: str, message_type: Any, callback: Callable[[Any], object]) -> None:
         """Call back on the spinning thread for each message; the quality of service fits the

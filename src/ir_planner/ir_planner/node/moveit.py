@@ -1,4 +1,4 @@
-"""MoveIt's services in front of the planner: the node `ir_moveit`.
+"""MoveIt's services and actions in front of the planner: the node `ir_moveit`.
 
 It plans nothing itself. What MoveIt's messages ask becomes a request to `ir_planner`; its answers
 become theirs, with the planner's report, joules and sentence on topics of their own. It needs
@@ -15,7 +15,8 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.action.server import ServerGoalHandle
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
@@ -40,12 +41,22 @@ from ir_msgs_py.ros.conversions import (
 )
 from ir_msgs_py.ros.node_process import run_node
 from ir_msgs_py.ros.parameters import Parameters
-from ir_msgs_py.ros.serving import ANY, BoundedService, unexpected
-from ir_msgs_py.ros.topics import LATCHED, LatestMessage
+from ir_msgs_py.ros.serving import ANY, BoundedService, RecordedActionServer, unexpected
+from ir_msgs_py.ros.topics import ACTION_SERVICES, LATCHED, LatestMessage
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.errors import PlannerError, RequestError
+from ir_planner.node.goal_queue import GoalQueue
 from ir_planner.node.inputs import LastState, has_joints, measured_velocity, of_joints
+from ir_planner.node.moveit_actions import (
+    EXECUTE,
+    MOVE,
+    Executor,
+    MoveAction,
+    check_controllers,
+)
+from ir_planner.node.moveit_monitor import SceneMonitor
 from ir_planner.node.moveit_requests import (
+    PIPELINE,
     MoveItSettings,
     check_free,
     check_group,
@@ -58,6 +69,7 @@ from ir_planner.node.moveit_requests import (
 )
 from ir_planner.node.moveit_scene import applied, refusal
 from ir_planner.node.requests import known_status
+from ir_planner.search import not_installed, registered
 from ir_values.arrays import FloatArray
 from ir_values.errors import (
     CallTimedOutError,
@@ -66,7 +78,8 @@ from ir_values.errors import (
     ServiceUnavailableError,
 )
 
-_THREADS = 4  # long and quick requests, scenes, a spare
+_THREADS = 8  # long and quick requests, scenes, topics, two goals, cancelling, a spare
+_GOALS_WAITING = 100  # of an action; beyond, a client is in a loop
 _PATIENCE = 10.0  # s for an answer beside the planning time
 _PAIRS = 20  # of a state that are looked at
 _ROBOT_LINK, _WORLD_OBJECT, _ATTACHED = range(3)  # of moveit_msgs/ContactInformation
@@ -76,15 +89,15 @@ class PlannerAnswers:
     """MoveIt's requests answered by the planner; messages are read and written by their fields.
 
     ask: calls a service of the planner: name, request, timeout [s]. state: the joints (n,) where
-    the robot is, for these names. report: takes the planner's report of a movement. contact: makes
-    a ContactInformation.
+    the robot is, for these names. report: takes the planner's report of a movement, its start state
+    and its trajectory. contact: makes a ContactInformation.
     """
 
     def __init__(
         self,
         ask: Callable[[str, Any, float], Any],
         state: Callable[[tuple[str, ...]], FloatArray],
-        report: Callable[[TrajectoryReport], None],
+        report: Callable[[TrajectoryReport, Any, Any], None],
         contact: Callable[[], Any],
         settings: Callable[[], MoveItSettings],
     ) -> None:
@@ -125,7 +138,7 @@ class PlannerAnswers:
         answer.trajectory.joint_trajectory = planned.trajectory
         answer.trajectory_start.joint_state = _first(planned.trajectory)
         answer.planning_time = planned.info.planning_time
-        self._report(planned.report)
+        self._report(planned.report, answer.trajectory_start, answer.trajectory)
         attempts = given.num_planning_attempts
         note = f"; {attempts} attempts were asked for, one answer is the best" * (attempts > 1)
         return Status.success(f"{said(planned.report)}{note}")
@@ -249,7 +262,7 @@ class PlannerAnswers:
         response.start_state.joint_state = start
         response.solution.joint_trajectory = planned.trajectory
         response.fraction = 1.0
-        self._report(planned.report)
+        self._report(planned.report, response.start_state, response.solution)
         note = "; it is free of collisions although avoid_collisions is false"
         return Status.success(f"{said(planned.report)}{note * (not request.avoid_collisions)}")
 
@@ -318,12 +331,44 @@ SERVICES = {
     "GetPositionIK": "compute_ik",
     "GetStateValidity": "check_state_validity",
     "ApplyPlanningScene": "apply_planning_scene",
+    "GetPlanningScene": "get_planning_scene",
+    "QueryPlannerInterfaces": "query_planner_interface",
+    "GetPlannerParams": "get_planner_params",
+    "SetPlannerParams": "set_planner_params",
 }
 """Name of each type of moveit_msgs, as MoveIt's move_group serves it."""
+ACTIONS = {"MoveGroup": MOVE, "ExecuteTrajectory": EXECUTE}
+
+
+def planners(request: Any, response: Any, description: Callable[[], Any]) -> Status:
+    """QueryPlannerInterfaces: the searches that can be used."""
+    one = description()
+    one.name = "certified movements of ir_planner"
+    one.pipeline_id = PIPELINE
+    one.planner_ids = sorted(
+        name for name, search in registered().items() if not not_installed(search)
+    )
+    response.planner_interfaces = [one]
+    return Status.success(f"{len(one.planner_ids)} searches")
+
+
+def planner_params(request: Any, response: Any) -> Status:
+    """GetPlannerParams: none that MoveIt sets."""
+    return Status.success("searches have no parameters here: ir_planner has settings")
+
+
+def set_planner_params(request: Any, response: Any) -> Status:
+    """SetPlannerParams: refused, unless it sets nothing."""
+    if len(request.params.keys):
+        raise refusal(
+            f"parameter {', '.join(request.params.keys[:3])}",
+            "searches are set by the parameters of ir_planner, under Advanced in its reference",
+        )
+    return Status.success("nothing was set")
 
 
 class MoveItNode(Node):
-    """Serves MoveIt's services. Raises IrError where moveit_msgs is missing."""
+    """Serves MoveIt's services and actions. Raises IrError where moveit_msgs is missing."""
 
     def __init__(self, **options: Any) -> None:
         types = moveit_types()
@@ -341,30 +386,111 @@ class MoveItNode(Node):
         self._energies = self.create_publisher(Float64, own(names.MOVEIT_ENERGY), LATCHED)
         self._states = LatestMessage(self, JointState, names.JOINT_STATES, 16)
         self._last = LastState(offered=lambda: self.count_publishers(names.JOINT_STATES) > 0)
+        msgs = import_module("moveit_msgs.msg")
         answers = PlannerAnswers(
             self._client.call,
             self._where,
             self._publish_report,
-            import_module("moveit_msgs.msg").ContactInformation,
+            msgs.ContactInformation,
             lambda: parameters.value,
         )
         plans = MutuallyExclusiveCallbackGroup()
         questions = MutuallyExclusiveCallbackGroup()
+        self._executor = Executor(self._drive)
+        apply = self._guarded(SERVICES["ApplyPlanningScene"], answers.apply_scene)
+        self._monitor = SceneMonitor(
+            self,
+            msgs,
+            parameters.value.group,
+            self._where_known,
+            apply,
+            self._executor.stop,
+            MutuallyExclusiveCallbackGroup(),
+        )
+
+        def scene(request: Any, response: Any) -> Status:
+            wanted = int(request.components.components)
+            response.scene = self._monitor.scene(answers.cell(), wanted)
+            return Status.success(f"{len(response.scene.world.collision_objects)} objects")
+
+        def offered(request: Any, response: Any) -> Status:
+            return planners(request, response, msgs.PlannerInterfaceDescription)
+
         for kind, handler, group in (
             ("GetMotionPlan", answers.plan, plans),
             ("GetCartesianPath", answers.cartesian_path, plans),
             ("GetPositionIK", answers.position_ik, questions),
             ("GetStateValidity", answers.state_validity, questions),
             ("ApplyPlanningScene", answers.apply_scene, questions),
+            ("GetPlanningScene", scene, questions),
+            ("QueryPlannerInterfaces", offered, questions),
+            ("GetPlannerParams", planner_params, questions),
+            ("SetPlannerParams", set_planner_params, questions),
         ):
             name = SERVICES[kind]
             guarded = self._guarded(name, handler)
             BoundedService(self, types[kind], name, guarded, group, put=put_error_code)
+        plan_type = types["GetMotionPlan"]
+        move = MoveAction(
+            answers.plan, lambda: (plan_type.Request(), plan_type.Response()), self._executor
+        )
+        self._actions = [
+            self._offer_action("MoveGroup", move.run),
+            self._offer_action("ExecuteTrajectory", self._execute),
+        ]
 
     def destroy_node(self) -> None:
         """Let go of the planner, then of the rest."""
         self._client.close()
+        for action in self._actions:
+            action.destroy()
         super().destroy_node()
+
+    def _offer_action(self, kind: str, run: Callable[..., Status]) -> RecordedActionServer:
+        """Serve an action of moveit_msgs: its goals are carried out one after the other."""
+        action_type = getattr(import_module("moveit_msgs.action"), kind)
+
+        def execute(goal: ServerGoalHandle) -> Any:
+            def feedback(state: str) -> None:
+                goal.publish_feedback(action_type.Feedback(state=state))
+
+            def work(request: Any, result: Any) -> Status:
+                return run(request, result, lambda: bool(goal.is_cancel_requested), feedback)
+
+            result = self._guarded(ACTIONS[kind], work)(goal.request, action_type.Result())
+            feedback("IDLE")
+            _end(goal, result.error_code.val)
+            return result
+
+        def refuse(goal: ServerGoalHandle) -> Any:
+            result = action_type.Result()
+            sentence = f"{_GOALS_WAITING} goals of {ACTIONS[kind]} wait already"
+            put_error_code(result, Status(StatusCode.FAILURE, sentence, self.get_name()))
+            goal.abort()
+            return result
+
+        goals = GoalQueue(execute, refuse, _GOALS_WAITING)
+        return RecordedActionServer(
+            self,
+            action_type,
+            ACTIONS[kind],
+            goals.execute,
+            handle_accepted_callback=goals.accepted,
+            cancel_callback=goals.cancel,
+            callback_group=ReentrantCallbackGroup(),
+            **ACTION_SERVICES,
+        )
+
+    def _execute(
+        self, goal: Any, result: Any, canceled: Callable[[], bool], feedback: Callable[[str], None]
+    ) -> Status:
+        """ExecuteTrajectory."""
+        check_controllers(goal.controller_names, self._settings.value.controller)
+        feedback("MONITOR")
+        return self._executor.drive(goal.trajectory, self._executor.watched(canceled))
+
+    def _drive(self, goal: Any, stopped: Callable[[], bool]) -> Any:
+        return self._client.send_goal(self._settings.value.controller, goal, give_up=stopped)
 
     def _guarded(self, name: str, handler: Callable[[Any, Any], Status]) -> Callable[..., Any]:
         """A service callback: the status goes into the response, to the topic and to the log."""
@@ -387,12 +513,23 @@ class MoveItNode(Node):
 
         return callback
 
-    def _publish_report(self, report: TrajectoryReport) -> None:
+    def _publish_report(self, report: TrajectoryReport, state: Any, trajectory: Any) -> None:
         self._reports.publish(report)
         self._energies.publish(Float64(data=report.energy))
+        self._monitor.show_path(state, trajectory)
+
+    def _where_known(self, joints: tuple[str, ...]) -> FloatArray | None:
+        """The last joint values (n,) that have come; None where there are none."""
+        self._look_for(joints)
+        return self._last.q
 
     def _where(self, joints: tuple[str, ...]) -> FloatArray:
         """Joint values (n,) where the robot is, of the last joint_states."""
+        self._look_for(joints)
+        return self._last.soon(time.monotonic, self._settings.value.state_max_age)
+
+    def _look_for(self, joints: tuple[str, ...]) -> None:
+        """Let joint_states be read for these joints, and read what has come."""
 
         def look() -> None:
             received = self._states.take(lambda message: has_joints(message, joints))
@@ -408,7 +545,17 @@ class MoveItNode(Node):
             self._last.take(q, came, measured_velocity(message, joints))
 
         self._last.look = look
-        return self._last.soon(time.monotonic, self._settings.value.state_max_age)
+        look()
+
+
+def _end(goal: ServerGoalHandle, code: int) -> None:
+    """End a goal as MoveIt does: succeeded, canceled where its client asked for it, aborted."""
+    if code == StatusCode.SUCCESS:
+        goal.succeed()
+    elif goal.is_cancel_requested:
+        goal.canceled()
+    else:
+        goal.abort()
 
 
 def moveit_types() -> dict[str, Any]:
@@ -430,7 +577,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments,
         executor=lambda: MultiThreadedExecutor(num_threads=_THREADS),
         refusals=(IrError, PlannerError),
-        about="Answers MoveIt's planning services with ir_planner.",
+        about="Answers MoveIt's services and actions with ir_planner.",
     )
 
 

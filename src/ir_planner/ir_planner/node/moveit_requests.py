@@ -19,16 +19,17 @@ from ir_description.poses import composed, inverse, rotation_from_quaternion
 from ir_kernels import portable
 from ir_msgs.msg import CartesianSegment, PlanOptions
 from ir_msgs.srv import ComputeIk, PlanCartesianMovement, PlanRegionalMovement
+from ir_msgs_py import names
 from ir_msgs_py.ros.conversions import pose_to_msg, stamped_pose_to_msg
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.node.inputs import of_joints
 from ir_planner.node.moveit_scene import frame_pose, pose_in, refusal
+from ir_planner.node.moveit_view import TIP
 from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError, shown
 from ir_values.settings import check_settings, setting
 
-TIP = "tcp"
 PIPELINE = "ir_planner"
 WAYPOINTS_MAX = 1000
 _WHOLE_TURN = 3.14  # rad: a tolerance of pi, as people round it
@@ -45,6 +46,11 @@ class MoveItSettings:
     """What MoveIt calls the robot, and what its requests do not say."""
 
     group: str = setting("manipulator", "Name of the planning group of the robot.", read_only=True)
+    controller: str = setting(
+        names.FOLLOW_JOINT_TRAJECTORY,
+        "Action that drives trajectories, of the type control_msgs/action/FollowJointTrajectory.",
+        read_only=True,
+    )
     safety_distance: float = setting(
         0.02, "Distance that everything keeps.", unit="m", minimum=0.0, maximum=1.0
     )
@@ -170,18 +176,18 @@ def _goal(given: Any, cell: Cell, what: str) -> Any:
 
 def _joint_goal(given: Sequence[Any], cell: Cell, what: str) -> Any:
     values = {each.joint_name: each for each in given}
-    names = cell.robot.joint_names
+    joints = cell.robot.joint_names
     if len(values) != len(given):
         raise refusal(what, "it names a joint twice")
-    missing = [name for name in names if name not in values]
-    unknown = [name for name in values if name not in names]
+    missing = [name for name in joints if name not in values]
+    unknown = [name for name in values if name not in joints]
     if missing or unknown:
         which = f"{', '.join(missing)} missing" if missing else f"{shown(unknown[0])} unknown"
-        raise refusal(what, f"{which}: all joints {', '.join(names)} make a goal")
+        raise refusal(what, f"{which}: all joints {', '.join(joints)} make a goal")
     for each in given:
         _tolerance(each.tolerance_above, f"{what}, {each.joint_name}")
         _tolerance(each.tolerance_below, f"{what}, {each.joint_name}")
-    return JointState(name=list(names), position=[float(values[name].position) for name in names])
+    return JointState(name=list(joints), position=[float(values[name].position) for name in joints])
 
 
 def _tolerance(value: float, what: str) -> None:

@@ -18,6 +18,7 @@ from ir_msgs_py.names import BASE_FRAME, WORLD_FRAME
 from ir_msgs_py.ros.conversions import pose_from_msg
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
+from ir_planner.node.moveit_view import Piece, allowed_here, allowed_in, objects_of
 from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError, PoseError, shown
 
@@ -75,10 +76,11 @@ class Applied:
 
 
 def applied(scene: Any, cell: Cell, objects: Collection[str]) -> Applied:
-    """The cell after a moveit_msgs/PlanningScene; objects: names of earlier ones. Raises
-    RequestError.
+    """The cell after a moveit_msgs/PlanningScene; objects: names of earlier ones. What a whole scene
+    repeats of the one that is published is no change. Raises RequestError.
     """
     check_scene(scene, cell)
+    published = {} if scene.is_diff else objects_of(cell)
     here = {machine.name: machine for machine in cell.equipment}
     ours = {name: here.pop(name) for name in sorted(objects) if name in here}
     if not scene.is_diff:
@@ -87,7 +89,12 @@ def applied(scene: Any, cell: Cell, objects: Collection[str]) -> Applied:
     if len(given) > OBJECTS_MAX:
         raise refusal(f"{len(given)} collision objects", f"at most {OBJECTS_MAX} are taken")
     notes = list[str]()
+    if not scene.is_diff and len(scene.robot_state.joint_state.name):
+        notes.append("the robot is where its joint_states say")
     for each in given:
+        name = str(each.id)
+        if name in published and name not in objects and _repeats(each, published[name], cell):
+            continue
         _apply(each, cell, here, ours, notes)
     machines = (*here.values(), *ours.values())
     try:
@@ -104,11 +111,18 @@ def check_scene(scene: Any, cell: Cell) -> None:
         )
     matrix = scene.allowed_collision_matrix
     state = scene.robot_state
+    entries = (*matrix.entry_names, *matrix.default_entry_names)
+    joints = state.joint_state.name or state.joint_state.position
+    if not scene.is_diff:  # whole scenes repeat what was published
+        entries = () if allowed_in(matrix) == allowed_here(cell) else entries
+        joints = ()
     held = {
-        "fixed_frame_transforms": scene.fixed_frame_transforms,
-        "allowed_collision_matrix": (*matrix.entry_names, *matrix.default_entry_names),
+        "fixed_frame_transforms": [
+            each for each in scene.fixed_frame_transforms if not _is_planning_frame(each)
+        ],
+        "allowed_collision_matrix": entries,
         "octomap": scene.world.octomap.octomap.data,
-        "robot_state.joint_state": state.joint_state.name or state.joint_state.position,
+        "robot_state.joint_state": joints,
         "robot_state.multi_dof_joint_state": state.multi_dof_joint_state.joint_names,
         "robot_state.attached_collision_objects": state.attached_collision_objects,
         "link_padding": [each for each in scene.link_padding if each.padding != 0.0],
@@ -123,6 +137,41 @@ def check_scene(scene: Any, cell: Cell) -> None:
     for name, value in held.items():
         if len(value):
             raise refusal(f"{name} of the scene", remedies.get(name, "it can't be taken"))
+
+
+def _is_planning_frame(msg: Any) -> bool:
+    """Whether a geometry_msgs/TransformStamped says that the planning frame is itself."""
+    if msg.header.frame_id != WORLD_FRAME or msg.child_frame_id not in ("", WORLD_FRAME):
+        return False
+    at = msg.transform.translation
+    q = msg.transform.rotation
+    return (at.x, at.y, at.z) == (0.0, 0.0, 0.0) and (q.x, q.y, q.z) == (0.0, 0.0, 0.0)
+
+
+def _repeats(msg: Any, published: Sequence[Piece], cell: Cell) -> bool:
+    """Whether a collision object is one that was published, as it was."""
+    operation = msg.operation[0] if isinstance(msg.operation, bytes) else int(msg.operation)
+    if operation != _ADD or msg.planes or msg.subframe_names:
+        return False
+    what = f"collision object {shown(str(msg.id))}"
+    at = composed(frame_pose(msg.header.frame_id, cell, what), pose_in(msg.pose, what))
+    kinds = {number: word for number, (word, _) in _PRIMITIVES.items()}
+    given = [
+        Piece(kinds.get(int(shape.type), ""), composed(at, pose_in(place, what)), shape.dimensions)
+        for shape, place in zip(msg.primitives, msg.primitive_poses, strict=False)
+    ]
+    for mesh, place in zip(msg.meshes, msg.mesh_poses, strict=False):
+        corners = np.array([(v.x, v.y, v.z) for v in mesh.vertices], float).reshape(-1, 3)
+        if not len(corners):
+            return False
+        given.append(Piece("mesh", composed(at, pose_in(place, what)), corners=corners))
+    left = list(published)
+    for piece in given:
+        same = next((one for one in left if one.agrees(piece)), None)
+        if same is None:
+            return False
+        left.remove(same)
+    return not left
 
 
 def _apply(

@@ -1,0 +1,148 @@
+"""MoveIt's actions: MoveGroup plans and executes, ExecuteTrajectory executes; what drives is a
+trajectory controller.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+from ir_msgs_py.status import Status, StatusCode
+from ir_planner.errors import RequestError
+from ir_planner.node.moveit_scene import refusal
+from ir_values.errors import IrError, shown
+
+MOVE = "move_action"
+EXECUTE = "execute_trajectory"
+STOP = "stop"
+_SUCCESSFUL = 0  # of control_msgs/FollowJointTrajectory
+_CODES = {
+    -1: StatusCode.INVALID_MOTION_PLAN,
+    -2: StatusCode.INVALID_MOTION_PLAN,
+    -3: StatusCode.INVALID_MOTION_PLAN,
+}
+Canceled = Callable[[], bool]
+Feedback = Callable[[str], None]
+
+
+def follow_goal() -> Any:
+    """The class of a controller's goals. Raises IrError where control_msgs is missing."""
+    try:
+        return import_module("control_msgs.action").FollowJointTrajectory.Goal
+    except ImportError as error:
+        raise IrError(
+            "control_msgs is not installed, so nothing can be executed: docs/ros_interfaces.md "
+            "says how it is built"
+        ) from error
+
+
+class Executor:
+    """Lets the controller drive a trajectory.
+
+    send: sends a goal and waits for its result; the second argument says when it is canceled.
+    """
+
+    def __init__(self, send: Callable[[Any, Canceled], Any]) -> None:
+        self._send = send
+        self._stops = 0
+
+    def stop(self) -> None:
+        """Stop what is driven now, along its path."""
+        self._stops += 1
+
+    def watched(self, canceled: Canceled) -> Canceled:
+        """Whether a goal that begins now is canceled, or all are stopped."""
+        before = self._stops
+        return lambda: canceled() or self._stops != before
+
+    def drive(self, trajectory: Any, stopped: Canceled) -> Status:
+        """Drive a moveit_msgs/RobotTrajectory to its end."""
+        if trajectory.multi_dof_joint_trajectory.points:
+            raise refusal(
+                "multi_dof_joint_trajectory",
+                "the robot has joints only",
+                StatusCode.INVALID_MOTION_PLAN,
+            )
+        if not trajectory.joint_trajectory.points:
+            return Status.success("a trajectory without points: nothing was driven")
+        if stopped():
+            return Status(StatusCode.PREEMPTED, "stopped before it was driven")
+        result = self._send(follow_goal()(trajectory=trajectory.joint_trajectory), stopped)
+        if stopped():
+            return Status(StatusCode.PREEMPTED, "stopped along the path")
+        if result.error_code != _SUCCESSFUL:
+            code = _CODES.get(int(result.error_code), StatusCode.CONTROL_FAILED)
+            return Status(code, f"the controller says: {result.error_string}")
+        return Status.success("driven to the end")
+
+
+@dataclass(frozen=True)
+class MoveAction:
+    """The action MoveGroup. plan: GetMotionPlan, from its request and response to a status; new:
+    the two, empty.
+    """
+
+    plan: Callable[[Any, Any], Status]
+    new: Callable[[], tuple[Any, Any]]
+    executor: Executor
+
+    def run(self, goal: Any, result: Any, canceled: Canceled, feedback: Feedback) -> Status:
+        """Plan, and where it is asked for, execute from where the robot is."""
+        options = goal.planning_options
+        _check_diff(options.planning_scene_diff)
+        stopped = self.executor.watched(canceled)
+        request, response = self.new()
+        request.motion_plan_request = goal.request
+        if not options.plan_only:  # as in MoveIt: what is driven begins where the robot is
+            request.motion_plan_request.start_state = type(goal.request.start_state)(is_diff=True)
+        feedback("PLANNING")
+        status = self.plan(request, response)
+        planned = response.motion_plan_response
+        result.trajectory_start = planned.trajectory_start
+        result.planned_trajectory = planned.trajectory
+        result.planning_time = planned.planning_time
+        if stopped():
+            return Status(StatusCode.PREEMPTED, "stopped while it was planned")
+        if options.plan_only or not status.ok:
+            return status
+        feedback("MONITOR")
+        driven = self.executor.drive(planned.trajectory, stopped)
+        if not driven.ok:
+            return driven
+        result.executed_trajectory = planned.trajectory
+        notes = [
+            f"{name} is not done, the plan is certified for the cell as it is"
+            for name in ("replan", "look_around")
+            if getattr(options, name)
+        ]
+        return Status.success("; ".join((status.message, driven.message, *notes)))
+
+
+def _check_diff(scene: Any) -> None:
+    """Refuse a scene that counts for one request only."""
+    state = scene.robot_state
+    given = {
+        "name": scene.name,
+        "robot_state": state.joint_state.name or state.attached_collision_objects,
+        "allowed_collision_matrix": scene.allowed_collision_matrix.entry_names,
+        "world": scene.world.collision_objects or scene.world.octomap.octomap.data,
+        "link_padding": scene.link_padding,
+        "link_scale": scene.link_scale,
+    }
+    for name, value in given.items():
+        if len(value):
+            raise refusal(
+                f"{name} of planning_scene_diff", "apply_planning_scene takes scenes, for all plans"
+            )
+
+
+def check_controllers(names: Any, controller: str) -> None:
+    """Refuse other controllers than the one that drives."""
+    own = {"", controller, controller.rpartition("/")[0]}
+    for name in names:
+        if name.strip("/") not in own:
+            raise RequestError(
+                StatusCode.CONTROL_FAILED, f"controller {shown(name)}: {controller} drives here"
+            )
