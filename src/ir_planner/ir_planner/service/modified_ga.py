@@ -5,8 +5,8 @@ A population of copies of the interaction configuration is perturbed, q_i <- q_i
 ~ N(mu_i, sigma). What comes nearer than S_m is dropped, with its reason; the rest is ranked by the
 total metric distance D to the machine. The mean grows with D and points where D grew and the tool
 leaves; the spread shrinks with the gain of D, and is 1 rad around a configuration whose offspring
-all collide, to get round what closes the zone. It goes on until D grows for every configuration and
-the zone is left. Every step is a certified edge.
+all collide, to get round what closes the zone. It goes on until configurations are outside whose D
+is larger than at the start. Every step is a certified edge.
 """
 
 from collections import Counter
