@@ -138,6 +138,16 @@ def test_tolerances_that_can_t_be_used_are_named_in_the_outcome(
     assert words in outcome.sentence
 
 
+def test_the_end_is_held_however_long_nothing_comes(make, start, run_out, plan, home) -> None:
+    simulation = make()
+    there = home + np.array([0.2, 0.0, 0.0, 0.0, 0.0, 0.0])
+    start(simulation, plan([0.0, 2.0], home, there))
+    assert run_out(simulation).code == ErrorCode.SUCCESSFUL
+    for _ in range(6):
+        simulation.run(5.0)
+        assert np.abs(simulation.backend.q - there).max() < 1e-3
+
+
 @pytest.mark.parametrize("join", [False, True])
 def test_a_stamp_in_the_past_starts_late_or_joins_in_the_middle(
     make, start, run_out, plan, home, join

@@ -496,3 +496,15 @@ def test_the_mode_and_code_numbers_are_those_of_the_messages():
     assert all(getattr(PowerMode, mode.name) == mode for mode in Mode)
     assert all(getattr(Status, code.name) == code for code in StatusCode)
     assert all(getattr(PlcInputs, mode.name) == mode for mode in plc.OperatingMode)
+
+
+def test_a_message_without_positions_is_refused() -> None:
+    """Velocities alone are not integrated."""
+    q = np.zeros((2, 6))
+    message = conversions.trajectory_to_msg(
+        JointTrajectory.from_seconds(JOINT_NAMES, [0.0, 1.0], q, q)
+    )
+    for point in message.points:
+        point.positions = []
+    with pytest.raises(TrajectoryError, match="point 0 has 0 positions for 6 joints"):
+        conversions.trajectory_from_msg(message)
