@@ -440,7 +440,7 @@ def test_a_whole_scene_replaces_earlier_objects_and_leaves_the_cell() -> None:
 @pytest.mark.parametrize(
     ("given_scene", "sentence"),
     [
-        (scene(thing("lathe", primitives=[BOX])), "a machine of the cell has this name"),
+        (scene(thing("lathe", primitives=[BOX])), "a machine or part of the cell has this name"),
         (scene(thing(primitives=[solid(SolidPrimitive.CONE, 1.0, 1.0)])), "a cone can't be taken"),
         (scene(thing(primitives=[solid(SolidPrimitive.BOX, 1.0)])), "a box has 3 dimensions"),
         (scene(thing(primitives=[solid(SolidPrimitive.SPHERE, -1.0)])), r"-1\.0"),

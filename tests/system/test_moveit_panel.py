@@ -52,6 +52,12 @@ NODES = {
 
 
 @pytest.fixture
+def ros_discovery_range() -> str:
+    """The nodes are other processes of this machine."""
+    return "LOCALHOST"
+
+
+@pytest.fixture
 def processes(ros_context: Any, tmp_path: Path) -> Iterator[dict[str, Any]]:
     """The three nodes; the context's fixture comes first, it says how far discovery reaches."""
     logs = {name: (tmp_path / f"{name}.log").open("w") for name in NODES}

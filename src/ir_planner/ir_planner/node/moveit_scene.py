@@ -76,11 +76,11 @@ class Applied:
 
 
 def applied(scene: Any, cell: Cell, objects: Collection[str]) -> Applied:
-    """The cell after a moveit_msgs/PlanningScene; objects: names of earlier ones. What a whole scene
-    repeats of the one that is published is no change. Raises RequestError.
+    """The cell after a moveit_msgs/PlanningScene; objects: names of earlier ones. What a scene that
+    is no diff repeats of the published one is no change. Raises RequestError.
     """
     check_scene(scene, cell)
-    published = {} if scene.is_diff else objects_of(cell)
+    published = {name: it for name, it in objects_of(cell).items() if name not in objects}
     here = {machine.name: machine for machine in cell.equipment}
     ours = {name: here.pop(name) for name in sorted(objects) if name in here}
     if not scene.is_diff:
@@ -93,9 +93,9 @@ def applied(scene: Any, cell: Cell, objects: Collection[str]) -> Applied:
         notes.append("the robot is where its joint_states say")
     for each in given:
         name = str(each.id)
-        if name in published and name not in objects and _repeats(each, published[name], cell):
-            continue
-        _apply(each, cell, here, ours, notes)
+        repeats = name in published and not scene.is_diff and _repeats(each, published[name], cell)
+        if not repeats:
+            _apply(each, cell, {*here, *published}, ours, notes)
     machines = (*here.values(), *ours.values())
     try:
         return Applied(replace(cell, equipment=machines), frozenset(ours), tuple(notes))
@@ -214,8 +214,8 @@ def _check_target(
     if operation not in (_ADD, _REMOVE, _APPEND, _MOVE):
         raise refusal(what, f"operation {operation} is unknown: 0 to 3 are", _CODE)
     if name in machines:
-        remedy = "set_equipment moves it, or switches it off"
-        raise refusal(what, f"a machine of the cell has this name; {remedy}", _CODE)
+        remedy = "set_equipment moves machines, or switches them off"
+        raise refusal(what, f"a machine or part of the cell has this name; {remedy}", _CODE)
     if operation != _ADD and name not in ours:
         raise refusal(what, f"no scene has added it: there are {', '.join(ours) or 'none'}", _CODE)
 
