@@ -52,7 +52,7 @@ from ir_planner.node.moveit_actions import (
     MOVE,
     Executor,
     MoveAction,
-    check_controllers,
+    other_controller,
 )
 from ir_planner.node.moveit_monitor import SceneMonitor
 from ir_planner.node.moveit_requests import (
@@ -485,7 +485,9 @@ class MoveItNode(Node):
         self, goal: Any, result: Any, canceled: Callable[[], bool], feedback: Callable[[str], None]
     ) -> Status:
         """ExecuteTrajectory."""
-        check_controllers(goal.controller_names, self._settings.value.controller)
+        other = other_controller(goal.controller_names, self._settings.value.controller)
+        if other is not None:
+            return other
         feedback("MONITOR")
         return self._executor.drive(goal.trajectory, self._executor.watched(canceled))
 

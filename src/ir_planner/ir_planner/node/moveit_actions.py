@@ -4,13 +4,12 @@ trajectory controller.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
 from ir_msgs_py.status import Status, StatusCode
-from ir_planner.errors import RequestError
 from ir_planner.node.moveit_scene import refusal
 from ir_values.errors import IrError, shown
 
@@ -18,11 +17,8 @@ MOVE = "move_action"
 EXECUTE = "execute_trajectory"
 STOP = "stop"
 _SUCCESSFUL = 0  # of control_msgs/FollowJointTrajectory
-_CODES = {
-    -1: StatusCode.INVALID_MOTION_PLAN,
-    -2: StatusCode.INVALID_MOTION_PLAN,
-    -3: StatusCode.INVALID_MOTION_PLAN,
-}
+_REFUSED = (-1, -2, -3)  # there: the goal, its joints, its stamp
+_CONTROL_FAILED = -4  # of moveit_msgs/MoveItErrorCodes
 Canceled = Callable[[], bool]
 Feedback = Callable[[str], None]
 
@@ -73,7 +69,8 @@ class Executor:
         if stopped():
             return Status(StatusCode.PREEMPTED, "stopped along the path")
         if result.error_code != _SUCCESSFUL:
-            code = _CODES.get(int(result.error_code), StatusCode.CONTROL_FAILED)
+            refused = int(result.error_code) in _REFUSED
+            code = StatusCode.INVALID_MOTION_PLAN if refused else _CONTROL_FAILED
             return Status(code, f"the controller says: {result.error_string}")
         return Status.success("driven to the end")
 
@@ -138,11 +135,11 @@ def _check_diff(scene: Any) -> None:
             )
 
 
-def check_controllers(names: Any, controller: str) -> None:
-    """Refuse other controllers than the one that drives."""
+def other_controller(names: Iterable[str], controller: str) -> Status | None:
+    """The refusal of a goal for other controllers than the one that drives, None for this one."""
     own = {"", controller, controller.rpartition("/")[0]}
     for name in names:
         if name.strip("/") not in own:
-            raise RequestError(
-                StatusCode.CONTROL_FAILED, f"controller {shown(name)}: {controller} drives here"
-            )
+            sentence = f"controller {shown(name)}: {controller} drives here"
+            return Status(_CONTROL_FAILED, sentence)
+    return None
