@@ -30,6 +30,7 @@ KNOWN = (
     ("src/ir_*/ir_*/node/*", "_*", "rclpy keeps an entity as long as its node refers to it"),
     ("src/ir_planner/ir_planner/node/answers.py", "*", "fields of messages"),
     ("src/ir_planner/ir_planner/node/moveit.py", "contact_body_* body_type_*", "of moveit_msgs"),
+    ("src/ir_planner/ir_planner/node/moveit_actions.py", "executed_trajectory", "of moveit_msgs"),
     ("src/ir_description/ir_description/files/making/urdf_tree.py", "*Handler", "of expat"),
     ("src/ir_description/ir_description/files/making/xacro_file.py", "get_*", "xacro asks it"),
     ("src/ir_kernels/setup.py", "extra_*", "the interface of setuptools"),

@@ -49,8 +49,8 @@ class Piece:
             theirs = _placed(other.corners, other.pose)
             from scipy.spatial import cKDTree  # only cells with meshes pay for this import
 
-            there = cKDTree(mine).query(theirs)[0].max()
-            back = cKDTree(theirs).query(mine)[0].max()
+            there = np.max(cKDTree(mine).query(theirs)[0])
+            back = np.max(cKDTree(theirs).query(mine)[0])
             return bool(max(there, back) <= within)
         return bool(
             np.allclose(self.dimensions, other.dimensions, rtol=0.0, atol=within)
