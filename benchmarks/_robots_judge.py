@@ -85,7 +85,7 @@ def driven(
     """The steps of every robot over some cycles, each begun up to `delay` s late, and never before
     its signals are there. Raises RuntimeError where all wait for each other.
     """
-    signals = {zone.signal: zone.initial for zone in plan.zones}
+    signals = {zone.signal: False for zone in plan.zones}
     todo = [list(program.movements) * cycles for program in plan.programs]
     pieces: list[list[Piece]] = [[] for _ in todo]
     done = [0] * len(todo)

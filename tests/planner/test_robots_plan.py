@@ -53,7 +53,7 @@ def test_two_robots_share_a_table_in_turns(plan: RobotsPlan) -> None:
     assert plan.certified
     (zone,) = plan.zones
     assert zone.first == "right"  # the table holds a blank when the programs begin
-    assert zone.initial
+    assert zone.turn == "right"
     assert plan.joules < plan.full_speed
     assert 0.0 <= plan.gap < 5.0
     for program, begin in zip(plan.programs, plan.begins, strict=True):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from textwrap import indent
@@ -97,7 +98,19 @@ class _Looked:
         """What looks wrong."""
         if self.several is None:
             return check_cell(self.cell)
-        return check_robot_cell(self.several, self.robot)
+        return (*check_robot_cell(self.several, self.robot), *_refused(self.several, self.robot))
+
+
+def _refused(several: RobotCells, robot: str) -> Iterator[Finding]:
+    """Why a robot's program can't be planned together with the others'."""
+    from ir_planner import RequestError
+    from ir_planner.robots import check_places, check_repeatable
+
+    try:
+        check_repeatable(robot, several.of_robot(robot))
+        check_places(several)
+    except RequestError as error:
+        yield Finding("error", robot, str(error))
 
 
 @dataclass(frozen=True, eq=False)

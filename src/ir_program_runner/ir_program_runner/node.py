@@ -144,7 +144,8 @@ class ProgramRunnerNode(Node):
         self._signals = self.create_publisher(SignalMsg, "~/signals", _SIGNALS)
         self._machine_signals = self.create_publisher(SignalMsg, "~/machine_signals", _SIGNALS)
         self._program_state = self.create_publisher(ProgramStateMsg, "~/program_state", _KEPT)
-        CommandTopic(self, SignalMsg, "~/signals", self._hear_signals, of=lambda msg: msg.name)
+        for topic in ("~/signals", *(f"{peer}/machine_signals" for peer in links.peers if peer)):
+            CommandTopic(self, SignalMsg, topic, self._hear_signals, of=lambda msg: msg.name)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(_MACHINES_PERIOD, self._let_machines_answer, clock=steady)
         self._last = Status.success()

@@ -61,6 +61,11 @@ class LinkSettings:
         "Cell file or bundled cell whose machines are simulated; empty: signals come from outside.",
         read_only=True,
     )
+    peers: tuple[str, ...] = setting(
+        ("",),
+        "Names of other robots' program runners, whose signals are heard: /right/ir_program_runner.",
+        read_only=True,
+    )
     seed: int = setting(
         0,
         "Seed of the process times that vary, of the machines that are simulated.",

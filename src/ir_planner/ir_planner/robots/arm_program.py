@@ -16,6 +16,7 @@ from ir_planner.cycle import ArmSchedule, ArmWork, Wait
 from ir_planner.errors import RequestError
 from ir_planner.flexible import RUNGS, Column, slowed_down, wait_modes
 from ir_planner.program import (
+    MOTORS,
     Charge,
     Pause,
     ProgramRequest,
@@ -104,6 +105,12 @@ class ArmProgram:
         """The stop before a movement."""
         stop = self.stops[k]
         return SweptArm.standing(stop.scene.chain, capsules_in(stop.scene), stop.q)
+
+    def lead(self, seconds: float) -> PlannedMovement:
+        """Standing on motors before the program begins."""
+        stop = self.stops[0]
+        asked = Pause(stop.name, seconds, MOTORS, stop.q, stop.scene)
+        return spent(asked, self.request.settings.transitions)
 
     def driven(
         self,

@@ -11,6 +11,7 @@ import numpy as np
 
 from ir_description import RobotCells
 from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.cycle import (
     ArmSchedule,
@@ -52,15 +53,15 @@ Chosen = list[list[Movement]]
 
 @dataclass(frozen=True)
 class SharedZone:
-    """A zone that two robots pass in turns. signal: true while it is `robots[1]`'s turn, and
-    whether it is when the programs begin. movements: of each, from its first to its last one there.
-    enter, leave [s]: of both, in the cycle of the first robot.
+    """A zone that two robots pass in turns. turn: whose it is when the programs begin; the signal
+    is false then, and true while it is the other one's. movements: of each, from its first to its
+    last one there. enter, leave [s]: of both, in the cycle of the first robot.
     """
 
     robots: tuple[str, str]
     movements: tuple[tuple[str, str], tuple[str, str]]
     signal: str
-    initial: bool
+    turn: str
     first: str
     enter: tuple[float, float]
     leave: tuple[float, float]
@@ -69,7 +70,8 @@ class SharedZone:
 @dataclass(frozen=True, eq=False)
 class RobotsPlan:
     """programs: one cycle of each of `robots`, from the stop before its first movement on; begins
-    [s]: when that is, in the cycle of the first robot; period [s]; fastest [s]: the shortest that
+    [s]: when that is, in the cycle of the first robot; leads: the pause of each until then, from
+    the earliest of these on; period [s]; fastest [s]: the shortest that
     is possible. joules of all in a cycle; full_speed [J]: of the same zones with all movements as
     fast as they can and motors on in every wait. gap [%]: how far joules can be above the least for
     these configurations, zones and curves. peak_power [W]: no shift of the robots needs more.
@@ -80,6 +82,7 @@ class RobotsPlan:
     name: str
     robots: tuple[str, ...] = ()
     programs: tuple[ProgramPlan, ...] = ()
+    leads: tuple[PlannedMovement, ...] = ()
     planners: tuple[Planner, ...] = ()
     zones: tuple[SharedZone, ...] = ()
     begins: tuple[float, ...] = ()
@@ -103,6 +106,12 @@ class RobotsPlan:
     def certified(self) -> bool:
         """Whether every robot keeps clear of the cell and of the others, whenever each moves."""
         return bool(self.programs) and all(each.report.certified for each in self.programs)
+
+    def run(self, robot: str, cycles: int) -> tuple[PlannedMovement, ...]:
+        """The steps of a robot for so many cycles, where all of them are started at once."""
+        k = self.robots.index(robot)
+        lead = self.leads[k : k + 1] if self.leads[k].duration > 0.0 else ()
+        return (*lead, *self.programs[k].movements * cycles)
 
     def __repr__(self) -> str:
         if not self.programs:
@@ -136,8 +145,8 @@ def plan_robots(
     """
     bounded(cycle_time, 0.0, PERIOD_MAX, "cycle_time", "s")
     planners = tuple(Planner(cell, settings=settings) for cell in cells.cells)
-    for robot, cell in zip(cells.robots, cells.cells, strict=True):
-        check_repeatable(robot, cell)
+    for robot in cells.robots:
+        check_repeatable(robot, cells.of_robot(robot))
     check_places(cells)
     arms: list[ArmProgram] = []
     try:
@@ -258,7 +267,9 @@ class _Joint:
         cycle = cheapest_joint(fixed, zones, first.period + _ROUNDING)
         assert cycle is not None  # no movement takes longer than was chosen
         names = self._names(len(zones))
-        signals = self._signals(zones, names)
+        turns = [_turn(zone, later, self.arms) for zone, later in zip(zones, cycle.later, strict=True)]
+        signals = self._signals(zones, names, turns)
+        begins = [self._begin(k, schedule) for k, schedule in enumerate(cycle.arms)]
         programs = []
         for k, (arm, planner) in enumerate(zip(self.arms, self.planners, strict=True)):
             steps = arm.driven(chosen[k], cycle.arms[k].waits, signals[k])
@@ -268,9 +279,14 @@ class _Joint:
             self.name,
             tuple(arm.robot for arm in self.arms),
             tuple(programs),
+            tuple(
+                arm.lead(begin - min(begins)) for arm, begin in zip(self.arms, begins, strict=True)
+            ),
             self.planners,
-            tuple(self._shared(n, zone, cycle, names[n]) for n, zone in enumerate(zones)),
-            tuple(self._begin(k, schedule) for k, schedule in enumerate(cycle.arms)),
+            tuple(
+                self._shared(n, zone, cycle, (names[n], turns[n])) for n, zone in enumerate(zones)
+            ),
+            tuple(begins),
             cycle.period,
             fastest,
             self._full_speed(zones, cycle.period),
@@ -300,45 +316,52 @@ class _Joint:
         return list(itertools.islice(free, count))
 
     def _signals(
-        self, zones: Sequence[Zone], names: Sequence[str]
+        self, zones: Sequence[Zone], names: Sequence[str], turns: Sequence[int]
     ) -> list[list[tuple[tuple[str, ...], tuple[str, ...]]]]:
         """Of each movement of each robot, the signals that it waits for and that it sets."""
         waits: list[list[list[str]]] = [[[] for _ in arm.steps] for arm in self.arms]
         sets: list[list[list[str]]] = [[[] for _ in arm.steps] for arm in self.arms]
-        for zone, name in zip(zones, names, strict=True):
-            for stretch, turn, done in (
-                (zone.one, f"{name}=0", name),
-                (zone.other, name, f"{name}=0"),
+        for zone, name, turn in zip(zones, names, turns, strict=True):
+            stretches = (zone.one, zone.other)
+            for stretch, free, done in (
+                (stretches[turn], f"{name}=0", name),
+                (stretches[1 - turn], name, f"{name}=0"),
             ):
                 count = len(self.arms[stretch.robot].steps)
                 last = (stretch.first + stretch.count - 1) % count
-                waits[stretch.robot][stretch.first].append(turn)
+                waits[stretch.robot][stretch.first].append(free)
                 sets[stretch.robot][last].append(done)
         return [
             [(tuple(w), tuple(s)) for w, s in zip(own_waits, own_sets, strict=True)]
             for own_waits, own_sets in zip(waits, sets, strict=True)
         ]
 
-    def _shared(self, n: int, zone: Zone, cycle: JointCycle, signal: str) -> SharedZone:
+    def _shared(
+        self, n: int, zone: Zone, cycle: JointCycle, signal: tuple[str, int]
+    ) -> SharedZone:
         spans = [
             _passed(stretch, cycle, len(self.arms[stretch.robot].steps))
             for stretch in (zone.one, zone.other)
         ]
         robots = [self.arms[stretch.robot].robot for stretch in (zone.one, zone.other)]
-        first = robots[int(cycle.later[n])]
-        begun = [
-            stretch.first + stretch.count > len(self.arms[stretch.robot].steps)
-            for stretch in (zone.one, zone.other)
-        ]
         return SharedZone(
             (robots[0], robots[1]),
             (self._span(zone.one), self._span(zone.other)),
-            signal,
-            begun[1] or (cycle.later[n] and not begun[0]),
-            first,
+            signal[0],
+            robots[signal[1]],
+            robots[int(cycle.later[n])],
             (spans[0][0], spans[1][0]),
             (spans[0][1], spans[1][1]),
         )
+
+
+def _turn(zone: Zone, later: bool, arms: Arms) -> int:
+    """Whose turn it is when the programs begin, 0 or 1: of who begins within, else who is first."""
+    begun = [
+        stretch.first + stretch.count > len(arms[stretch.robot].steps)
+        for stretch in (zone.one, zone.other)
+    ]
+    return int(begun[1] or (later and not begun[0]))
 
 
 def _passed(stretch: Stretch, cycle: JointCycle, count: int) -> tuple[float, float]:
