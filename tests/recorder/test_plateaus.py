@@ -40,7 +40,7 @@ def test_the_controller_of_the_cell_counts_where_no_other_data_are_attached(
     )
 
     def idle(path: str) -> dict[str, float]:
-        text = files_of_cell(path).cell_yaml
+        text = files_of_cell(path)[0].cell_yaml
         attached = data_of_cell(text).get(contents.POWER, "")
         return idle_watts(analyse(replace(analysis.recording, cell_yaml=text, power_yaml=attached)))
 

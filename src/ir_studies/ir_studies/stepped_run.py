@@ -6,14 +6,19 @@ Everything that the nodes do is done but what takes the nodes' own time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+
+import numpy as np
 
 from ir_description import Cell
 from ir_msgs_py.announcements import Event
 from ir_msgs_py.modes import PowerMode
 from ir_msgs_py.names import END_REST
 from ir_msgs_py.plc import Signal
-from ir_msgs_py.report import PlannedMovement
+from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_program_runner import Machines, Program, ProgramResult, ProgramSettings
@@ -40,14 +45,22 @@ class SteppedRun:
     and `signals`, what the program remarked in `notes`. deviation [m]: largest of the tool.
     """
 
-    def __init__(self, cell: Cell, plant: str = "nominal", seed: int = 0) -> None:
+    def __init__(
+        self,
+        cell: Cell,
+        plant: str = "nominal",
+        seed: int = 0,
+        before_step: Callable[[], None] = lambda: None,
+    ) -> None:
         self.cell = cell
+        self._before_step = before_step
         self.simulation: Simulation = make_simulation(cell, plant=plant)
         self.machines = Machines.of(cell, seed)
         self.steps: list[TendedStep] = []
         self.signals: list[SignalChange] = []
         self.notes: list[str] = []
         self.deviation = 0.0
+        self.told: Callable[[Signal], None] = lambda signal: None  # whom the program's signals reach
         self._movements: Sequence[PlannedMovement] = ()
         self._begin = (0.0, 0.0)
         self._start = (0.0, 0.0)
@@ -113,6 +126,7 @@ class SteppedRun:
             case ask.SetSignal(signal):
                 self.machines.set(signal, plant.time)
                 self._note(signal)
+                self.told(signal)
             case ask.WaitUntil(moment):
                 self._until(lambda: plant.time >= moment, moment)
             case ask.WaitForSignals(signals, timeout):
@@ -172,6 +186,7 @@ class SteppedRun:
         return Status.success()
 
     def _step(self) -> None:
+        self._before_step()
         self.simulation.step()
         now = self.simulation.time
         if self.machines.next_answer <= now:
@@ -197,3 +212,102 @@ def driven_program(
     if not result.status.ok:
         raise DrivingError(f"{run.simulation.plant.name}: {result.status.message}")
     return run
+
+
+class _Turns:
+    """Lets simulations advance in turns: it is always that one's whose time is least."""
+
+    def __init__(self, count: int) -> None:
+        self._times = [0.0] * count
+        self._changed = threading.Condition()
+
+    def wait(self, number: int, time: float) -> None:
+        """Return when it is the turn of this simulation, which is at a time [s]."""
+        with self._changed:
+            self._times[number] = time
+            self._changed.notify_all()
+            self._changed.wait_for(lambda: self._times.index(min(self._times)) == number)
+
+    def wait_no_more(self, number: int) -> None:
+        """Never let the others wait for this one again."""
+        with self._changed:
+            self._times[number] = math.inf
+            self._changed.notify_all()
+
+
+class _RobotRun(SteppedRun):
+    """One of several robots; time (N,) [s] and q (N, n) of it are in `times` and `postures`."""
+
+    def __init__(self, cell: Cell, plant: str, turns: _Turns, number: int) -> None:
+        super().__init__(cell, plant, before_step=self._take_turn)
+        self.times: list[float] = []
+        self.postures: list[FloatArray] = []
+        self.result: ProgramResult | None = None
+        self._turns = turns
+        self._number = number
+        self._zero = np.inf
+
+    def begin(self, q: FloatArray) -> None:
+        """Stand where the program begins; the time of all robots counts from now on."""
+        self.place(q)
+        self._zero = self.simulation.time
+
+    def _take_turn(self) -> None:
+        now = self.simulation.time - self._zero
+        if now < 0.0:
+            return
+        self._turns.wait(self._number, now)
+        self.times.append(now)
+        self.postures.append(np.array(self.simulation.backend.q))
+
+    def follow(self, movements: Sequence[PlannedMovement], settings: ProgramSettings) -> None:
+        """Drive a program in turns with the others."""
+        self._turns.wait(self._number, 0.0)
+        try:
+            self.result = self.run(movements, settings)
+        finally:
+            self._turns.wait_no_more(self._number)
+
+
+def driven_robots(
+    cells: Mapping[str, Cell],
+    programs: Mapping[str, Sequence[PlannedMovement]],
+    *,
+    plant: str = "nominal",
+    late: Mapping[str, float] | None = None,
+    signal_timeout: float = 60.0,
+) -> dict[str, _RobotRun]:
+    """Several robots in one time, each with its own program and controller; a signal of one is
+    heard by all. late [s]: how much later robots begin. DrivingError where a program doesn't end.
+    """
+    turns = _Turns(len(cells))
+    runs = {
+        robot: _RobotRun(cell, plant, turns, k) for k, (robot, cell) in enumerate(cells.items())
+    }
+    threads = []
+    for robot, run in runs.items():
+        first = next(step for step in programs[robot] if step.trajectory is not None)
+        assert first.trajectory is not None
+        run.begin(first.trajectory.positions[0])
+        run.told = partial(_tell, [other for other in runs.values() if other is not run])
+        wait = PlannedMovement(
+            kind=MovementKind.PAUSE, duration=(late or {}).get(robot, 0.0), load=first.load
+        )
+        settings = ProgramSettings(signal_timeout=signal_timeout)
+        steps = (wait, *programs[robot]) if wait.duration > 0.0 else programs[robot]
+        threads.append(threading.Thread(target=run.follow, args=(steps, settings), name=robot))
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for robot, run in runs.items():
+        run.close()
+        if run.result is None or not run.result.status.ok:
+            why = "it ended by an error" if run.result is None else run.result.status.message
+            raise DrivingError(f"{robot}: {why}")
+    return runs
+
+
+def _tell(others: Sequence[SteppedRun], signal: Signal) -> None:
+    for other in others:
+        other.machines.hear(signal, other.simulation.time)

@@ -44,6 +44,11 @@ class RobotCells:
         ]
         return RobotCells(name, tuple(robot for robot, _ in cells), tuple(own), description)
 
+    @property
+    def by_name(self) -> dict[str, Cell]:
+        """The cell of each robot."""
+        return dict(zip(self.robots, self.cells, strict=True))
+
     def of_robot(self, name: str) -> Cell:
         """The cell as one of the robots sees it."""
         if name not in self.robots:
@@ -56,7 +61,7 @@ class RobotCells:
         """
         visited = {
             robot: {step.target for step in cell.program if step.kind == "STATION"}
-            for robot, cell in zip(self.robots, self.cells, strict=True)
+            for robot, cell in self.by_name.items()
         }
         anybody = set[str]().union(*visited.values())
         return tuple(

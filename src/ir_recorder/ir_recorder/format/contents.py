@@ -47,6 +47,11 @@ UNSHORTENED_PAUSES: Final = (
 )
 
 
+def attached(namespace: str, name: str) -> str:
+    """Name of an attachment of the cell in a namespace: "left/cell.yaml"; "cell.yaml" in none."""
+    return f"{namespace}/{name}".strip("/")
+
+
 # A recording in several files: when the next begins, its name, and what shows that they belong
 # together.
 

@@ -191,7 +191,7 @@ class _Asked:
 
     overwrite: bool
     topics: tuple[str, ...]
-    files: CellFiles | None
+    files: tuple[CellFiles, ...]
     roots: FileRoots
     split: Split | None
 
@@ -279,7 +279,7 @@ class RecorderNode(Node):
             raise PathError(f"already recording into {self._recording.session.path}; stop first")
         wanted = checked_topics(topics) or self._settings.wanted_topics
         name = cell or self._settings.cell
-        files = files_of_cell(name) if name else None
+        files = files_of_cell(name) if name else ()
         asked = _Asked(overwrite, wanted, files, roots or self._settings.file_roots, split)
         into = self._open(path, asked)
         self._failure = ""
@@ -296,8 +296,8 @@ class RecorderNode(Node):
         self._asked = asked
         self._selection = TopicSelection(asked.topics, self.get_namespace())
         self._passed_over.clear()
-        if asked.files is not None:
-            self._attach(asked.files)
+        for files in asked.files:
+            self._attach(files)
         self._cell.begin()
         self._parameter_requests.begin()
         self._discover()
@@ -407,7 +407,7 @@ class RecorderNode(Node):
         if self._recording is None:
             return
         self._parameter_requests.each()
-        if not self.cell_attached:
+        if not (self.cell_attached or (self._asked and self._asked.files)):
             self._cell.each()
 
     def _attach(self, files: CellFiles) -> None:

@@ -487,5 +487,6 @@ class _Reader:
         return float((stamp.sec * 1_000_000_000 + stamp.nanosec - self._start) * 1e-9)
 
     def _attached(self, name: str) -> str:
-        data = self._raw.attachment(name)
+        own = self._raw.attachment(contents.attached(self._namespace, name))
+        data = self._raw.attachment(name) if own is None else own
         return data.decode(errors="replace") if data is not None else ""

@@ -9,7 +9,15 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from pathlib import Path
 
-from ir_description import DescriptionError, cell_from_yaml, cell_to_yaml, load_cell, robot_urdf
+from ir_description import (
+    DescriptionError,
+    cell_from_yaml,
+    cell_to_yaml,
+    load_cell,
+    load_robot_cells,
+    robot_in,
+    robot_urdf,
+)
 from ir_recorder.errors import LostFileError, PathError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import Split, part_facts, part_path
@@ -104,10 +112,13 @@ PACKAGES = (
 
 @dataclass(frozen=True)
 class CellFiles:
-    """The cell in its own file format, and the robot's URDF."""
+    """The cell in its own file format, and the robot's URDF; namespace: of one of several robots,
+    whose attachments are in a folder of its name.
+    """
 
     cell_yaml: str
     urdf: str
+    namespace: str = ""
 
 
 class RecordingSession:
@@ -184,18 +195,18 @@ class RecordingSession:
 
     def attach_cell(self, files: CellFiles, time: int) -> None:
         """Puts cell, URDF and the data of robot and controller beside the messages, once."""
-        if self.holds(contents.CELL):
+        texts = {contents.CELL: files.cell_yaml, contents.URDF: files.urdf}
+        if self.holds(contents.attached(files.namespace, contents.CELL)):
             return
-        self.attach(contents.CELL, files.cell_yaml, time)
-        if files.urdf:
-            self.attach(contents.URDF, files.urdf, time)
-        for name, text in data_of_cell(files.cell_yaml).items():
-            self.attach(name, text, time)
+        for name, text in (texts | data_of_cell(files.cell_yaml)).items():
+            if text:
+                self.attach(contents.attached(files.namespace, name), text, time)
 
     def attach(self, name: str, text: str, time: int) -> None:
         """Puts a text beside the messages; the first of a name stays."""
         if name not in self._attached:
-            media = "application/xml" if name == contents.URDF else "application/yaml"
+            xml = name.endswith(contents.URDF)
+            media = "application/xml" if xml else "application/yaml"
             self._attached[name] = media, text.encode()
             self._writer.attach(name, media, text.encode(), time)
 
@@ -246,12 +257,19 @@ def installed_version(package: str) -> str:
 # The cell as a recording carries it, so that the file can be read on its own.
 
 
-def files_of_cell(name_or_path: str) -> CellFiles:
-    """Files of a bundled cell or of one on disk; PathError when there is none or it is broken."""
+def files_of_cell(name_or_path: str) -> tuple[CellFiles, ...]:
+    """Files of a bundled cell or of one on disk, of each robot where it has several; PathError when
+    there is none or it is broken.
+    """
     try:
-        cell = load_cell(name_or_path)
+        named = robot_in(name_or_path)[1]
+        several = None if named else load_robot_cells(name_or_path)
+        cells = {"": load_cell(name_or_path)} if several is None else several.by_name
     except DescriptionError as error:
         raise PathError(f"cell {name_or_path[:200]!r} can't be attached: {error}") from error
-    return CellFiles(
-        cell_to_yaml(cell), robot_urdf(cell.robot, cell.tool, cell.tcp, cell.base_pose)
+    return tuple(
+        CellFiles(
+            cell_to_yaml(cell), robot_urdf(cell.robot, cell.tool, cell.tcp, cell.base_pose), robot
+        )
+        for robot, cell in cells.items()
     )
