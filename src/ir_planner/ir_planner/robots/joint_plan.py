@@ -267,7 +267,9 @@ class _Joint:
         cycle = cheapest_joint(fixed, zones, first.period + _ROUNDING)
         assert cycle is not None  # no movement takes longer than was chosen
         names = self._names(len(zones))
-        turns = [_turn(zone, later, self.arms) for zone, later in zip(zones, cycle.later, strict=True)]
+        turns = [
+            _turn(zone, later, self.arms) for zone, later in zip(zones, cycle.later, strict=True)
+        ]
         signals = self._signals(zones, names, turns)
         begins = [self._begin(k, schedule) for k, schedule in enumerate(cycle.arms)]
         programs = []
@@ -336,9 +338,7 @@ class _Joint:
             for own_waits, own_sets in zip(waits, sets, strict=True)
         ]
 
-    def _shared(
-        self, n: int, zone: Zone, cycle: JointCycle, signal: tuple[str, int]
-    ) -> SharedZone:
+    def _shared(self, n: int, zone: Zone, cycle: JointCycle, signal: tuple[str, int]) -> SharedZone:
         spans = [
             _passed(stretch, cycle, len(self.arms[stretch.robot].steps))
             for stretch in (zone.one, zone.other)

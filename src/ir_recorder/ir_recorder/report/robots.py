@@ -1,0 +1,160 @@
+"""The page of a recording of several robots: each of them and all together, when each moved, waited
+and passed a zone, and what holds between them. Each robot has a page of its own beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ir_recorder.analysis import Analysis, Finding
+from ir_recorder.analysis.results import StepResult
+from ir_recorder.analysis.robots import zone_passes
+from ir_recorder.analysis.tending import Span
+from ir_recorder.report.files import write_output
+from ir_recorder.report.gantt import Bar, Gantt, mode_bars
+from ir_recorder.report.headline import verdict
+from ir_recorder.report.number_text import DASH, joules, seconds, text, watts
+from ir_recorder.report.page import PAGE_START, asset
+from ir_recorder.report.tables import check_table, table
+from ir_values.files import ANYWHERE, FileRoots
+
+_GRID = 0.01  # s: the meter's
+
+
+def write_robots(
+    analyses: Mapping[str, Analysis],
+    checks: Sequence[Finding],
+    path: str | Path,
+    roots: FileRoots = ANYWHERE,
+) -> Path:
+    """Writes the page below `roots`; its absolute path. PathError when it can't be written."""
+    return write_output(path, robots_html(analyses, checks).encode(), PAGE_START, roots)
+
+
+def robots_html(analyses: Mapping[str, Analysis], checks: Sequence[Finding]) -> str:
+    """The page as text."""
+    first = next(iter(analyses.values()))
+    cell = first.cell.name.rpartition(".")[0] if first.cell is not None else ""
+    name = cell or first.recording.path.stem
+    title = f"{name}: {len(analyses)} robots"
+    head = (
+        '<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
+    )
+    what = f"{first.recording.origin}, all robots of one recording"
+    return (
+        f'<!doctype html><html lang="en"><head>{head}<title>{text(title)}</title>'
+        f"<style>{asset('page.css')}</style></head><body><header><div><h1>{text(title)}</h1>"
+        f'<p class="subtitle">{text(what)}</p></div>{verdict(checks)}</header><main>'
+        f"<section><h2>Energy and time of the programs</h2>{_table(analyses)}</section>"
+        f"<section><h2>Who moved, waited and passed a zone when</h2>{_figure(analyses)}</section>"
+        f'<section id="checks"><h2>Checks</h2>{check_table(checks)}</section></main>'
+        f"<script>{asset('export.js')}\nexportButtons();</script></body></html>"
+    )
+
+
+def _table(analyses: Mapping[str, Analysis]) -> str:
+    heads = ("robot", ">steps", ">time", ">energy", ">predicted", ">waited for signals", ">peak")
+    rows = [
+        (
+            f'<a href="{text(robot)}.html">{text(robot)}</a>',
+            str(len(analysis.steps)),
+            seconds(program_span(analysis).seconds),
+            f"<b>{joules(driven_joules(analysis))}</b>",
+            joules(predicted_joules(analysis)),
+            seconds(sum(waited(analysis).values())),
+            watts(analysis.peak_power),
+        )
+        for robot, analysis in analyses.items()
+    ]
+    every = analyses.values()
+    rows.append(
+        (
+            "<b>all together</b>",
+            str(sum(len(analysis.steps) for analysis in every)),
+            seconds(_whole(analyses).seconds),
+            f"<b>{joules(sum(map(driven_joules, every)))}</b>",
+            joules(sum(map(predicted_joules, every))),
+            DASH,
+            watts(common_peak(analyses)),
+        )
+    )
+    return table(heads, rows, "Robots")
+
+
+def program_span(analysis: Analysis) -> Span:
+    """From the first step until the last one has ended."""
+    steps = [result.step for result in analysis.steps]
+    return Span(steps[0].start, steps[-1].end) if steps else Span(0.0, 0.0)
+
+
+def driven_joules(analysis: Analysis) -> float:
+    """Joules at the mains from the first step until the last one has ended, waits included."""
+    power = analysis.recording.power
+    if power is None:
+        return float("nan")
+    span = program_span(analysis)
+    begin, end = np.interp([span.begin, span.end], power.time, power.energy)
+    return float(end - begin)
+
+
+def predicted_joules(analysis: Analysis) -> float:
+    """Joules of the steps, as planned."""
+    return sum(result.step.movement.report.energy for result in analysis.steps)
+
+
+def waited(analysis: Analysis) -> dict[str, float]:
+    """Seconds between two steps, by the signals that the second one waited for."""
+    found: dict[str, float] = {}
+    for before, result in zip(analysis.steps, analysis.steps[1:], strict=False):
+        names = " ".join(result.step.movement.wait_for)
+        if names:
+            late = max(result.step.start - before.step.end, 0.0)
+            found[names] = found.get(names, 0.0) + late
+    return found
+
+
+def common_peak(analyses: Mapping[str, Analysis]) -> float:
+    """The largest power at the mains of all robots at one time [W]."""
+    meters = [a.recording.power for a in analyses.values() if a.recording.power is not None]
+    if not meters:
+        return float("nan")
+    low = max(float(meter.time[0]) for meter in meters)
+    high = min(float(meter.time[-1]) for meter in meters)
+    grid = np.arange(low, high, _GRID)
+    total = sum((np.interp(grid, m.time, m.power) for m in meters), np.zeros(len(grid)))
+    return float(total.max(initial=0.0))
+
+
+def _whole(analyses: Mapping[str, Analysis]) -> Span:
+    spans = [program_span(analysis) for analysis in analyses.values() if analysis.steps]
+    if not spans:
+        return Span(0.0, 0.0)
+    return Span(min(span.begin for span in spans), max(span.end for span in spans))
+
+
+def _figure(analyses: Mapping[str, Analysis]) -> str:
+    span = _whole(analyses)
+    if span.seconds <= 0.0:
+        return '<p class="empty">No program was driven.</p>'
+    chart = Gantt(span)
+    for robot, analysis in analyses.items():
+        chart.lane(robot, [_bar(result) for result in analysis.steps])
+        if analysis.recording.power is not None:
+            chart.lane("mode", mode_bars(analysis.recording.power, span))
+    for signal, passes in zone_passes(analyses).items():
+        styles = zip(passes.items(), ("loaded", "empty"), strict=True)
+        chart.lane(
+            signal,
+            [(style, each, robot) for (robot, spans), style in styles for each in spans],
+        )
+    chart.power([a.recording.power for a in analyses.values() if a.recording.power is not None])
+    return f'<figure class="figure">{chart.drawn("robots", "robots, zones and power")}</figure>'
+
+
+def _bar(result: StepResult) -> Bar:
+    step = result.step
+    style = "empty" if step.movement.is_pause else "loaded"
+    return style, Span(step.start, step.end), step.label
