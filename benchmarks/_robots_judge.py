@@ -5,6 +5,7 @@ with their signals alone: it drives them with delays of its own, and measures di
 from __future__ import annotations
 
 import heapq
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -119,6 +120,20 @@ def driven(
     return pieces
 
 
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Recorded joint values q (N, n) at times (N,) [s], and from when on which load is carried."""
+
+    times: FloatArray
+    q: FloatArray
+    loads: list[tuple[float, str]]
+
+    def at(self, time: float) -> tuple[FloatArray, str]:
+        """Joint values between the two that are nearest in time, and the load."""
+        load = next((load for when, load in reversed(self.loads) if when <= time), "")
+        return np.array([np.interp(time, self.times, own) for own in self.q.T]), load
+
+
 class Judge:
     """Distances between two robots by Coal."""
 
@@ -149,6 +164,18 @@ class Judge:
             now = [_posture(own[at[k]], time, q[k]) for k, own in enumerate(pieces)]
             loads = [own[at[k]].step.load for k, own in enumerate(pieces)]
             distance = self.distance((now[0], now[1]), (loads[0], loads[1]))
+            best = min(best, (distance, time))
+            time += max((distance - margin) / self.speed, RESOLUTION)
+        return best
+
+    def least_recorded(self, paths: Sequence[Path], margin: float) -> tuple[float, float]:
+        """The same of two robots whose joint values were recorded."""
+        end = min(path.times[-1] for path in paths)
+        best = (np.inf, 0.0)
+        time = max(path.times[0] for path in paths)
+        while time <= end:
+            now = [path.at(time) for path in paths]
+            distance = self.distance((now[0][0], now[1][0]), (now[0][1], now[1][1]))
             best = min(best, (distance, time))
             time += max((distance - margin) / self.speed, RESOLUTION)
         return best

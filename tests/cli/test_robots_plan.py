@@ -73,6 +73,21 @@ def test_a_station_that_no_program_visits_is_checked_for_the_nearest_robot(
     assert found == [["far"], []]
 
 
+def test_a_program_that_cannot_be_repeated_is_an_error_of_the_check(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (Path(ir_description.__file__).parent / "data/robot_cells/two_robots.yaml").read_text()
+    file = tmp_path / "cell.yaml"
+    file.write_text(text.replace("table_seat, detach: gear, dwell: 0.5}", "table_seat}", 1))
+    assert main(["check", f"{file}@left"]) == 1
+    assert "the program of left ends with gear in the gripper" in capsys.readouterr().out
+
+
+def test_a_limit_of_the_peak_belongs_to_several_robots(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "demo", "--peak-power", "20"]) == 2
+    assert "--peak-power needs a CELL with several robots" in capsys.readouterr().err
+
+
 def test_a_robot_that_a_cell_does_not_have_is_said(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", "two_robots@middle"]) == 2
     assert "robot 'middle' is unknown; known are left, right" in capsys.readouterr().err

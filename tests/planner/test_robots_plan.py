@@ -98,6 +98,17 @@ def test_a_part_is_put_down_where_none_lies_and_taken_where_one_does(plan: Robot
         assert set(lying.tolist()) <= {0, 1}
 
 
+def test_a_limit_of_the_peak_holds_at_every_shift(plan: RobotsPlan, two: RobotCells) -> None:
+    limit = 0.75 * plan.peak_power
+    limited = plan_robots(two, cycle_time=14.0, peak_power=limit)
+    assert limited.certified
+    assert limited.peak_power <= limit
+    peaks = [max(step.report.peak_power for step in p.movements) for p in limited.programs]
+    assert sum(peaks) <= limit
+    least = plan_robots(two, peak_power=2000.0)
+    assert "needs more than its share of the peak" in least.status.message
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 3])
 def test_drawn_robots_keep_apart(seed: int, tmp_path: Path) -> None:

@@ -75,6 +75,8 @@ def add_plan(plan: argparse.ArgumentParser) -> None:
     plan.add_argument(
         "--cycle-time", type=float, default=0.0, metavar="S", help="for the cycle; 0: free (0)"
     )
+    words = "of several robots: all together never need more; 0: no limit (0)"
+    plan.add_argument("--peak-power", type=float, default=0.0, metavar="KW", help=words)
     plan.add_argument("--start", default="park", help="posture or joint values (park)")
     plan.add_argument(
         "--saving",
@@ -110,6 +112,8 @@ def run_plan(arguments: argparse.Namespace) -> int:
     several = robots_of(arguments.cell or "")
     if several is not None:
         return run_robots(arguments, several)
+    if arguments.peak_power:
+        raise InputError("--peak-power needs a CELL with several robots, such as two_robots")
     if arguments.parts_per_hour is not None:
         return run_steady(arguments, lambda *what: _report(arguments, *what))
     _check_steady_options(arguments)

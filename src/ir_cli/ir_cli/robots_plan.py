@@ -60,6 +60,7 @@ def run_robots(arguments: argparse.Namespace, cells: RobotCells) -> int:
         plan = plan_robots(
             cells,
             cycle_time=arguments.cycle_time,
+            peak_power=1e3 * arguments.peak_power,
             options=options_of(arguments),
             settings=settings,
         )

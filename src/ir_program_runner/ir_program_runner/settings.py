@@ -63,7 +63,7 @@ class LinkSettings:
     )
     peers: tuple[str, ...] = setting(
         ("",),
-        "Names of other robots' program runners, whose signals are heard: /right/ir_program_runner.",
+        "Names of other robots' program runners whose signals are heard: /right/ir_program_runner.",
         read_only=True,
     )
     seed: int = setting(

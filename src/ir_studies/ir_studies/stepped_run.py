@@ -237,7 +237,7 @@ class _Turns:
             self._changed.notify_all()
 
 
-class _RobotRun(SteppedRun):
+class RobotRun(SteppedRun):
     """One of several robots; time (N,) [s] and q (N, n) of it are in `times` and `postures`."""
 
     def __init__(self, cell: Cell, plant: str, turns: _Turns, number: int) -> None:
@@ -247,15 +247,15 @@ class _RobotRun(SteppedRun):
         self.result: ProgramResult | None = None
         self._turns = turns
         self._number = number
-        self._zero = np.inf
+        self.zero = np.inf
 
     def begin(self, q: FloatArray) -> None:
         """Stand where the program begins; the time of all robots counts from now on."""
         self.place(q)
-        self._zero = self.simulation.time
+        self.zero = self.simulation.time
 
     def _take_turn(self) -> None:
-        now = self.simulation.time - self._zero
+        now = self.simulation.time - self.zero
         if now < 0.0:
             return
         self._turns.wait(self._number, now)
@@ -278,14 +278,12 @@ def driven_robots(
     plant: str = "nominal",
     late: Mapping[str, float] | None = None,
     signal_timeout: float = 60.0,
-) -> dict[str, _RobotRun]:
+) -> dict[str, RobotRun]:
     """Several robots in one time, each with its own program and controller; a signal of one is
     heard by all. late [s]: how much later robots begin. DrivingError where a program doesn't end.
     """
     turns = _Turns(len(cells))
-    runs = {
-        robot: _RobotRun(cell, plant, turns, k) for k, (robot, cell) in enumerate(cells.items())
-    }
+    runs = {robot: RobotRun(cell, plant, turns, k) for k, (robot, cell) in enumerate(cells.items())}
     threads = []
     for robot, run in runs.items():
         first = next(step for step in programs[robot] if step.trajectory is not None)

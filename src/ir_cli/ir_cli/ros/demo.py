@@ -3,8 +3,9 @@
 Of a cell with a program its pauses and the transitions of hibernation and Bus Power Off are
 shortened, so that it takes a minute instead of half an hour; the recording carries the facts and
 the report shows them. A cell with a route is tended: its cheapest cycle is planned, the line filled
-from empty, and so many cycles are made, with pauses and transitions as they are. The clock is never
-scaled. The exit code is 0 when every check of the recording held.
+from empty, and so many cycles are made, with pauses and transitions as they are. Several robots do
+so many joint cycles (`robots_demo`). The clock is never scaled. The exit code is 0 when every check
+of the recording held.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from ir_cli.errors import DemonstrationError
 from ir_cli.output import Progress, add_renamed, table
 from ir_cli.planning import sentences
 from ir_cli.ports import UDP, free_port
+from ir_cli.robots_plan import robots_of
 from ir_cli.ros.domain import apply, own_domain
 from ir_cli.ros.power_tour import MODE_SECONDS, PowerWatch, tour
 from ir_cli.ros.processes import NodeProcesses, cell_nodes
@@ -82,7 +84,7 @@ class Outcome:
             self._saved(),
             *self.analysis.problems,
         ]
-        parts += [_sentence(check) for check in self.checks if not check.ok]
+        parts += [check_sentence(check) for check in self.checks if not check.ok]
         parts.append(f"checks: {summary(self.checks)[1]}")
         return "\n\n".join(part for part in parts if part)
 
@@ -175,7 +177,8 @@ def _total(energy: float, seconds: float) -> str:
     return f"{energy / 1000.0:.1f} kJ ({energy / 3600.0:.1f} Wh) in {seconds:.1f} s"
 
 
-def _sentence(check: Finding) -> str:
+def check_sentence(check: Finding) -> str:
+    """A check that does not hold, in words."""
     allowed = interval(check.low, check.high, check.unit)
     note = f" ({check.note})" if check.note else ""
     if check.verdict is Verdict.NOT_CHECKED:
@@ -322,8 +325,8 @@ class Demonstration:
                     recorder={"facts": self._facts(), "roots": [str(self._out.resolve())]},
                 )
             )
-            _await_services(client, nodes)
-            with _naming_the_dead(nodes):
+            await_services(client, nodes, _SERVICES)
+            with naming_the_dead(nodes):
                 self._start_recording(client, recording)
                 progress.end(str(recording))
                 failed = self._story(client)
@@ -436,9 +439,12 @@ class Demonstration:
         send_packet(magic_packet(self._link.mac), self._link.wake_address, self._link.wake_port)
 
 
-def _await_services(client: Client, nodes: NodeProcesses) -> None:
+_SERVICES = (names.GET_CELL, names.SET_PLC_INPUT, names.START_RECORDING)
+
+
+def await_services(client: Client, nodes: NodeProcesses, services: Sequence[str]) -> None:
     """Wait until every node offers its services; a node that ends meanwhile is named at once."""
-    wanted = {f"/{name}" for name in (names.GET_CELL, names.SET_PLC_INPUT, names.START_RECORDING)}
+    wanted = {f"/{name}" for name in services}
     deadline = time.monotonic() + START_SECONDS
     while missing := wanted - set(client.graph.services()):
         nodes.check()
@@ -448,7 +454,7 @@ def _await_services(client: Client, nodes: NodeProcesses) -> None:
 
 
 @contextmanager
-def _naming_the_dead(nodes: NodeProcesses) -> Iterator[None]:
+def naming_the_dead(nodes: NodeProcesses) -> Iterator[None]:
     """A request that fails because a node ended says which node, and why."""
     try:
         yield
@@ -489,9 +495,9 @@ def add_demo(demo: argparse.ArgumentParser) -> None:
     )
     words = "the program's own pauses and the controller's own transitions (default: shortened)"
     demo.add_argument("--real-pauses", action="store_true", help=words)
-    words = "of a cell with a route: its cycle makes at least so many (0: as many as possible)"
+    words = "of a route, or several robots: a cycle makes at least so many (0: the most possible)"
     demo.add_argument("--parts-per-hour", type=float, default=0.0, metavar="R", help=words)
-    words = "of a cell with a route: whole cycles, after the line was filled (3)"
+    words = "of the same: whole cycles, with a route after the line was filled (3)"
     demo.add_argument("--cycles", type=int, default=3, metavar="N", help=words)
     demo.set_defaults(run=run)
 
@@ -501,11 +507,19 @@ def run(arguments: argparse.Namespace) -> int:
     apply(own_domain())
 
     from ir_cli.ros.domain import alone
+    from ir_cli.ros.robots_demo import RobotsDemonstration
 
-    words = (arguments.cell, arguments.output, arguments.seed, arguments.plant)
+    words = (arguments.output, arguments.seed, arguments.plant, Progress())
+    cell = arguments.cell
     tended = Tended(arguments.parts_per_hour, arguments.cycles)
     real = arguments.real_pauses
     with alone(""), sentences():
-        outcome = Demonstration(*words, Progress(), real_pauses=real, tended=tended).run()
+        cells = robots_of(cell)
+        demonstration = (
+            Demonstration(cell, *words, real_pauses=real, tended=tended)
+            if cells is None
+            else RobotsDemonstration(cell, cells, *words, tended)
+        )
+        outcome = demonstration.run()
     sys.stdout.write(outcome.text() + "\n")
     return 0 if outcome.ok else 1

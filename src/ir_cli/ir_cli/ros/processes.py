@@ -30,6 +30,11 @@ class NodeCommand:
     parameters: Mapping[str, object] = field(default_factory=dict)
     namespace: str = ""
 
+    @property
+    def name(self) -> str:
+        """Of the process: its module, after its namespace."""
+        return f"{self.namespace}/{self.module}".strip("/").replace("/", ".")
+
     def arguments(self) -> list[str]:
         """Return the command line; strings are quoted so that YAML keeps them strings."""
         line = [
@@ -89,9 +94,9 @@ class NodeProcesses:
         self.stop()
 
     def start(self, commands: Sequence[NodeCommand]) -> None:
-        """Start the nodes side by side; their output goes to `<module>.log` in the log folder."""
+        """Start the nodes side by side; their output goes to `<name>.log` in the log folder."""
         for command in commands:
-            name = command.module
+            name = command.name
             with self._log(name).open("wb") as log:
                 self._running[name] = subprocess.Popen(
                     command.arguments(),
@@ -103,7 +108,7 @@ class NodeProcesses:
                 )
 
     def ids(self) -> dict[str, int]:
-        """Process ids by module."""
+        """Process ids by name."""
         return {name: process.pid for name, process in self._running.items()}
 
     def check(self) -> None:

@@ -34,6 +34,7 @@ from ir_planner.timing import Movement
 from ir_values.arrays import FloatArray
 
 _SAME = 1e-9  # rad
+_SLOWER = tuple(1.1**k for k in range(1, 25))  # times the slowest, up to ten times
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +77,38 @@ class ArmProgram:
         if step.from_station == step.to_station:
             return f"{step.kind} {step.to_station}"
         return f"{step.kind} {step.from_station or 'start'} to {step.to_station}"
+
+    @property
+    def peak_power(self) -> float:
+        """The most that its fastest movements need [W]."""
+        return max(column.movements[0].report.peak_power for column in self.columns)
+
+    def within(self, watts: float) -> ArmProgram:
+        """The same without movements that need more than so many watts, slowed down where all do.
+        Raises StageError where that is not enough.
+        """
+        columns = tuple(self._below(k, watts) for k in range(len(self.columns)))
+        return replace(self, columns=columns)
+
+    def _below(self, k: int, watts: float) -> Column:
+        known = self.columns[k].movements
+        kept = [each for each in known if each.report.peak_power <= watts]
+        slowest = known[-1]
+        for factor in () if kept or slowest.fixed_time else _SLOWER:
+            slower = slowest.stretched_by(factor)
+            if slower.certified and slower.report.peak_power <= watts:
+                kept.append(slower)
+                break
+        if not kept:
+            least = min(each.report.peak_power for each in known)
+            raise StageError(
+                Status(
+                    StatusCode.PLANNING_FAILED,
+                    f"{self.robot} needs more than its share of the peak, {watts / 1e3:.1f} kW, "
+                    f"for {self.label(k)}, also slowed down: {least / 1e3:.1f} kW as planned",
+                )
+            )
+        return Column.of(kept)
 
     def work(self, movements: Sequence[Movement] | None = None) -> ArmWork:
         """What the schedule decides about; movements: these alone instead of the columns."""

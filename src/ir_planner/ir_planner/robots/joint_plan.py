@@ -42,6 +42,7 @@ from ir_planner.settings import PlannerSettings
 from ir_planner.timing import Movement
 
 PERIOD_MAX = 86_400.0  # s
+WATTS_MAX = 1e7
 _ROUNDING = 1e-6  # s: of the linear program
 _SLACK = 1.0005  # of the shortest period, where none is asked for
 _ROUNDS = 20  # until no chosen movements meet outside the zones
@@ -137,13 +138,16 @@ def plan_robots(
     cells: RobotCells,
     *,
     cycle_time: float = 0.0,
+    peak_power: float = 0.0,
     options: PlanOptions | None = None,
     settings: PlannerSettings | None = None,
 ) -> RobotsPlan:
     """The cheapest joint cycle of the programs of all robots of a cell that takes `cycle_time` s,
-    0: as short as possible. Raises RequestError for what makes no sense.
+    0: as short as possible. peak_power [W]: no shift of the robots needs more, 0: no limit. Raises
+    RequestError for what makes no sense.
     """
     bounded(cycle_time, 0.0, PERIOD_MAX, "cycle_time", "s")
+    bounded(peak_power, 0.0, WATTS_MAX, "peak_power", "W")
     planners = tuple(Planner(cell, settings=settings) for cell in cells.cells)
     for robot in cells.robots:
         check_repeatable(robot, cells.of_robot(robot))
@@ -154,9 +158,20 @@ def plan_robots(
             request, work = planner.cycle_request(options)
             arms.append(planned_arm(robot, request, Journal(work, request.options.seed)))
         check_lying_parts(arms)
+        arms = _within(arms, peak_power)
         return _Joint(cells.name, tuple(arms), planners).plan(cycle_time)
     except StageError as failed:
         return RobotsPlan(failed.status, cells.name, cells.robots)
+
+
+def _within(arms: list[ArmProgram], watts: float) -> list[ArmProgram]:
+    """Programs that need at most so many watts together, whenever each of them moves: every robot
+    gets a share as large as its part of the sum of all peaks.
+    """
+    whole = sum(arm.peak_power for arm in arms)
+    if watts == 0.0 or whole <= watts:
+        return arms
+    return [arm.within(watts * arm.peak_power / whole) for arm in arms]
 
 
 class _Joint:

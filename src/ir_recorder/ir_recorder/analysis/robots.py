@@ -37,7 +37,7 @@ class Nearest:
 
 
 def nearest(one: Analysis, other: Analysis) -> Nearest | None:
-    """How near two robots came to each other; None where their joint states or cells are missing."""
+    """How near two robots came to each other; None where joint states or a cell are missing."""
     arms = [_Arm.of(analysis) for analysis in (one, other)]
     if arms[0] is None or arms[1] is None:
         return None

@@ -4,7 +4,7 @@ modes, machines and power at the mains.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.tending import PartRow, Span, Tending

@@ -1,0 +1,96 @@
+"""Two robots driven in one time by the program runner's own steps, judged by Coal on their joints."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path as File
+
+import numpy as np
+import pytest
+
+sys.path.append(str(File(__file__).parents[2] / "benchmarks"))  # the judge of the benchmark
+
+from _robots_judge import Judge, Path
+
+from ir_description import RobotCells, load_robot_cells
+from ir_msgs_py.report import PlannedMovement
+from ir_planner.robots import RobotsPlan, plan_robots
+from ir_studies.errors import DrivingError
+from ir_studies.stepped_run import RobotRun, driven_robots
+
+MARGIN = 0.02  # m: S_m
+SHARE = 0.01  # of joules
+CYCLES = 2
+
+
+@cache
+def cells() -> RobotCells:
+    found = load_robot_cells("two_robots")
+    assert found is not None
+    return found
+
+
+@cache
+def plan() -> RobotsPlan:
+    return plan_robots(cells(), cycle_time=10.0)
+
+
+def programs() -> dict[str, tuple[PlannedMovement, ...]]:
+    return {robot: plan().run(robot, CYCLES) for robot in plan().robots}
+
+
+def without(signals: str, steps: Sequence[PlannedMovement]) -> tuple[PlannedMovement, ...]:
+    """Steps that wait for nobody, or tell nobody."""
+    return tuple(replace(step, **{signals: ()}) for step in steps)
+
+
+def driven(
+    given: Mapping[str, Sequence[PlannedMovement]], late: Mapping[str, float] | None = None
+) -> dict[str, RobotRun]:
+    return driven_robots(cells().by_name, given, late=late, signal_timeout=30.0)
+
+
+def nearest(runs: Mapping[str, RobotRun]) -> float:
+    judge = Judge((cells().cells[0], cells().cells[1]))
+    paths = [
+        Path(
+            np.array(run.times),
+            np.array(run.postures),
+            [(step.start - run.zero, step.movement.load) for step in run.steps],
+        )
+        for run in runs.values()
+    ]
+    return judge.least_recorded(paths, MARGIN)[0]
+
+
+def off(runs: Mapping[str, RobotRun]) -> float:
+    """How far the tools were off their paths [m]."""
+    return sum(run.deviation for run in runs.values())
+
+
+def test_two_robots_need_what_was_planned_and_keep_apart() -> None:
+    runs = driven(programs())
+    joules = sum(step.joules for run in runs.values() for step in run.steps)
+    assert joules == pytest.approx(CYCLES * plan().joules, rel=SHARE)
+    assert nearest(runs) >= MARGIN - off(runs)
+
+
+@pytest.mark.parametrize("robot", ["left", "right"])
+def test_a_late_robot_shifts_who_waits_for_it_and_they_keep_apart(robot: str) -> None:
+    runs = driven(programs(), {robot: 3.0})
+    assert nearest(runs) >= MARGIN - off(runs)
+    assert max(run.times[-1] for run in runs.values()) < CYCLES * plan().period + 3.5
+
+
+def test_a_planted_wrong_order_is_found() -> None:
+    free = {robot: without("wait_for", steps) for robot, steps in programs().items()}
+    assert nearest(driven(free, {"right": 4.0})) < 0.0
+
+
+def test_a_robot_whose_turn_never_comes_stands_and_says_so() -> None:
+    silent = {**programs(), "right": without("set_signals", programs()["right"])}
+    with pytest.raises(DrivingError, match=r"left: .*signal zone_1 did not come within 30 s"):
+        driven(silent)
