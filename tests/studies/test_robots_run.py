@@ -1,4 +1,4 @@
-"""Two robots driven in one time by the program runner's own steps, judged by Coal on their joints."""
+"""Two robots driven in one time by the program runner, judged by Coal on their joint values."""
 
 from __future__ import annotations
 
