@@ -168,8 +168,10 @@ class Judge:
             time += max((distance - margin) / self.speed, RESOLUTION)
         return best
 
-    def least_recorded(self, paths: Sequence[Path], margin: float) -> tuple[float, float]:
-        """The same of two robots whose joint values were recorded."""
+    def least_recorded(
+        self, paths: Sequence[Path], margin: float, resolution: float = RESOLUTION
+    ) -> tuple[float, float]:
+        """The same of two robots whose joint values were recorded; resolution [s]: of the looks."""
         end = min(path.times[-1] for path in paths)
         best = (np.inf, 0.0)
         time = max(path.times[0] for path in paths)
@@ -177,7 +179,7 @@ class Judge:
             now = [path.at(time) for path in paths]
             distance = self.distance((now[0][0], now[1][0]), (now[0][1], now[1][1]))
             best = min(best, (distance, time))
-            time += max((distance - margin) / self.speed, RESOLUTION)
+            time += max((distance - margin) / self.speed, resolution)
         return best
 
     def distance(self, q: tuple[FloatArray, FloatArray], loads: tuple[str, str]) -> float:

@@ -22,6 +22,7 @@ from ir_studies.errors import DrivingError
 from ir_studies.stepped_run import RobotRun, driven_robots
 
 MARGIN = 0.02  # m: S_m
+LOOK = 0.005  # s: 1 cm of the tools
 SHARE = 0.01  # of joules
 CYCLES = 2
 
@@ -63,7 +64,7 @@ def nearest(runs: Mapping[str, RobotRun]) -> float:
         )
         for run in runs.values()
     ]
-    return judge.least_recorded(paths, MARGIN)[0]
+    return judge.least_recorded(paths, MARGIN, LOOK)[0]
 
 
 def off(runs: Mapping[str, RobotRun]) -> float:
@@ -78,6 +79,7 @@ def test_two_robots_need_what_was_planned_and_keep_apart() -> None:
     assert nearest(runs) >= MARGIN - off(runs)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("robot", ["left", "right"])
 def test_a_late_robot_shifts_who_waits_for_it_and_they_keep_apart(robot: str) -> None:
     runs = driven(programs(), {robot: 3.0})
@@ -90,6 +92,7 @@ def test_a_planted_wrong_order_is_found() -> None:
     assert nearest(driven(free, {"right": 4.0})) < 0.0
 
 
+@pytest.mark.long
 def test_a_robot_whose_turn_never_comes_stands_and_says_so() -> None:
     silent = {**programs(), "right": without("set_signals", programs()["right"])}
     with pytest.raises(DrivingError, match=r"left: .*signal zone_1 did not come within 30 s"):
