@@ -43,11 +43,6 @@ def programs() -> dict[str, tuple[PlannedMovement, ...]]:
     return {robot: plan().run(robot, CYCLES) for robot in plan().robots}
 
 
-def without(signals: str, steps: Sequence[PlannedMovement]) -> tuple[PlannedMovement, ...]:
-    """Steps that wait for nobody, or tell nobody."""
-    return tuple(replace(step, **{signals: ()}) for step in steps)
-
-
 def driven(
     given: Mapping[str, Sequence[PlannedMovement]], late: Mapping[str, float] | None = None
 ) -> dict[str, RobotRun]:
@@ -88,12 +83,16 @@ def test_a_late_robot_shifts_who_waits_for_it_and_they_keep_apart(robot: str) ->
 
 
 def test_a_planted_wrong_order_is_found() -> None:
-    free = {robot: without("wait_for", steps) for robot, steps in programs().items()}
+    free = {
+        robot: tuple(replace(step, wait_for=()) for step in steps)
+        for robot, steps in programs().items()
+    }
     assert nearest(driven(free, {"right": 4.0})) < 0.0
 
 
 @pytest.mark.long
 def test_a_robot_whose_turn_never_comes_stands_and_says_so() -> None:
-    silent = {**programs(), "right": without("set_signals", programs()["right"])}
+    right = tuple(replace(step, set_signals=()) for step in programs()["right"])
+    silent = {**programs(), "right": right}
     with pytest.raises(DrivingError, match=r"left: .*signal zone_1 did not come within 30 s"):
         driven(silent)

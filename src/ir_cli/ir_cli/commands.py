@@ -128,7 +128,7 @@ COMMANDS = (
     ),
     Command(
         "demo",
-        "ir_cli.ros.demo:add_demo",
+        "ir_cli.ros.demo_command:add_demo",
         "plan, drive, record and explain a cell with real nodes",
         "Plans, drives, records and explains a cell, with real nodes and a simulated robot; exit "
         "code 0 when every check of the recording held.",

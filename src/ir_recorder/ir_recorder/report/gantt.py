@@ -74,7 +74,7 @@ class Gantt:
     def power(self, meters: Sequence[PowerSeries]) -> None:
         """Mean power at the mains, of all meters together."""
         edges = np.linspace(self._span.begin, self._span.end, _BINS + 1)
-        energy = sum(np.interp(edges, meter.time, meter.energy) for meter in meters)
+        energy = np.sum([np.interp(edges, m.time, m.energy) for m in meters], axis=0)
         means = np.diff(energy) / np.diff(edges)
         most = max(float(means.max()), 1.0)
         low = self._height + _POWER
