@@ -49,7 +49,7 @@ def test_the_page_has_both_motions_and_all_figures(compared: BeforeAfter, planne
     assert angles[row] == pytest.approx(
         first.sample(np.array([row * today["step"]])).q[0], abs=2e-4
     )
-    for words in ("saved a year", "CO2", "peak power", "pause at point_2", "Assumed: price 0.2, "):
+    for words in ("saved a year", "CO2", "peak power", "pause at point_2", "0.2 EUR/kWh"):
         assert words in page
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,9 +25,9 @@ from ir_recorder.report.compare import comparison_html
 from ir_recorder.report.costs import (
     NAMES,
     Costs,
+    assumed_section,
     clock_section,
     costs_section,
-    given_and_assumed,
     idle_saving,
     lever_section,
     money,
@@ -154,14 +155,20 @@ def test_rest_outside_of_the_shifts_is_priced_by_mode(analysis: Analysis) -> Non
 
 
 def test_assumptions_are_marked_and_given_figures_are_not(analysis: Analysis) -> None:
-    assumed = costs_section(analysis, Costs())
-    assert "Given" not in assumed
-    words = given_and_assumed(Costs())
-    assert words.startswith("Assumed: price 0.2, ")
-    assert words.count(",") == len(NAMES) - 1
-    own = costs_section(analysis, replace(Costs(), price=0.5, given=("price",)))
-    assert "Given: price 0.5. Assumed: currency EUR, " in own
-    assert "Assumed" not in costs_section(analysis, replace(Costs(), given=NAMES))
+    for given in ((), ("price",), ("shift_hours", "currency"), NAMES):
+        costs = replace(Costs(), price=0.5, given=given)
+        origins = re.findall(
+            r"<small>(\w+)</small></td><td[^>]*><b>([^<]*)</b><small>([^<]*)",
+            assumed_section(costs),
+        )
+        assert [name for name, _, _ in origins] == list(NAMES)
+        marked = {name for name, _, words in origins if words == "from your file"}
+        assert marked == set(given)
+        assert all(words == "assumed" for name, _, words in origins if name not in given)
+        assert ("price", "0.5 EUR/kWh") in [row[:2] for row in origins]
+        words = "all assumed" if not given else "partly assumed"
+        words = "as your file gives it" if given == NAMES else words
+        assert words in costs_section(analysis, costs)
 
 
 def test_the_cycle_is_the_one_with_full_pauses(analysis: Analysis) -> None:

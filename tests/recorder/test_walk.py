@@ -77,10 +77,15 @@ def costs_of(seed: int) -> Costs:
     return Costs(price=draw(0.1, 0.4), shift_hours=draw(4.0, 8.0), demand_price=draw(10.0, 100.0))
 
 
+def cycles_of(seconds: float, costs: Costs) -> tuple[float, float]:
+    """Cycles of a shift and of a year."""
+    shift = costs.shift_hours * 3600.0 * costs.availability / seconds
+    return shift, shift * costs.shifts_per_day * costs.days_per_year
+
+
 def quantities(analysis: Analysis, cycle: Production, costs: Costs) -> dict[str, float]:
     """What the pages show under these names, computed once, here."""
-    cycles = costs.shift_hours * 3600.0 * costs.availability / cycle.seconds
-    year = cycles * costs.shifts_per_day * costs.days_per_year
+    cycles, year = cycles_of(cycle.seconds, costs)
     price = costs.production_price / 3.6e6
     found = {
         "a year of such cycles": cycle.energy * year * price,
@@ -106,7 +111,8 @@ def quantities(analysis: Analysis, cycle: Production, costs: Costs) -> dict[str,
         found[f"{lever.name}: a year, at most a year"] = lever.joules * year * price
         found[f"{lever.name}: all a year"] = lever.joules * year
     if cycle.savings is not None:
-        saved = abs(cycle.savings.total.saved) * year * price
+        _, of_plan = cycles_of(cycle.savings.total.seconds, costs)
+        saved = abs(cycle.savings.total.saved) * of_plan * price
         found |= {
             "saved together: a year": saved,
             "saved by its plan, a year: robot": saved,

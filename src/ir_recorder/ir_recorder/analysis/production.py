@@ -117,6 +117,15 @@ class Production:
     drives_only: bool = False
 
     @property
+    def pace(self) -> float:
+        """Seconds from one cycle of a year to the next: its own where it was driven, of a
+        plan those of the program that it is held against: both make as many.
+        """
+        if self.origin != PREDICTED or self.savings is None:
+            return self.seconds
+        return self.savings.total.seconds or self.seconds
+
+    @property
     def supply(self) -> str:
         """DRIVES_ONLY, or "" where the energy is that of the mains."""
         return DRIVES_ONLY if self.drives_only else ""

@@ -27,7 +27,8 @@ from ir_recorder.analysis.steps import step_label
 from ir_recorder.report.charts import Point, front_chart
 from ir_recorder.report.costs import (
     Costs,
-    given_and_assumed,
+    assumed_section,
+    counted_with,
     payback,
     yearly_end,
     yearly_money,
@@ -84,6 +85,7 @@ def comparison_html(compared: Sequence[Compared], costs: Costs | None = None) ->
         "problems": _problems(analyses, names),
         "paid": _paid(compared, names, costs or Costs()),
         "supply": "" if any(map(drives_only, analyses)) else " at the mains",
+        "assumed": assumed_section(costs or Costs()),
         "figures": _figures(compared, names),
         "front": front_chart(_points(analyses, names)),
         "steps": _steps(analyses, names),
@@ -145,10 +147,10 @@ def _paid(compared: Sequence[Compared], names: Sequence[str], costs: Costs) -> s
         "A year is one cycle after the other in shifts, pauses at full length, without nights and "
         "weekends. What a plan saves is "
         "predicted, against the same stations by PTP at full speed and the controller's own "
-        f"timers; intervals hold 90 %. {given_and_assumed(costs)}"
+        "timers; intervals hold 90 %. "
     )
     shown = table(("", *(f">{name}" for name in names)), rows, "For those who pay")
-    return f'{shown}<p class="hint">{text(hint)}</p>'
+    return f'{shown}<p class="hint">{text(hint)}{counted_with(costs)}</p>'
 
 
 def _year(cycle: Production | None, first: Production | None, costs: Costs) -> str:

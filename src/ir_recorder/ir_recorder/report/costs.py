@@ -11,7 +11,7 @@ from typing import TypeGuard
 
 from ir_description import DescriptionFileError, load_power_data
 from ir_description.files import plain_yaml
-from ir_msgs_py.savings import ProgramSavings, Saving
+from ir_msgs_py.savings import Saving
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.production import (
     Amount,
@@ -218,14 +218,16 @@ class Costs:
     def energy_of_year(self, cycle: Production) -> Amount:
         """Joules of a year of such cycles, one after the other."""
         amount = Amount(cycle.energy, cycle.low, cycle.high)
-        return amount.times(self.cycles_per_year(cycle.seconds))
+        return amount.times(self.cycles_per_year(cycle.pace))
 
     def saving_of_year(self, cycle: Production) -> Amount | None:
-        """Joules of a year that the plan saves of them; None where it is not known."""
+        """Joules of a year that the plan saves, predicted: of as many cycles as the program makes
+        that it is held against, however long a run of it took; None where it is not known.
+        """
         if cycle.savings is None:
             return None
-        saved = saved_amount(cycle.savings.total)
-        return saved.times(self.cycles_per_year(cycle.seconds))
+        total = cycle.savings.total
+        return saved_amount(total).times(self.cycles_per_year(total.seconds or cycle.seconds))
 
 
 SETTINGS: tuple[Setting, ...] = tuple(each for each in describe(Costs) if each.name != "given")
@@ -271,13 +273,13 @@ def _checked(where: str, key: str, value: object) -> float | str:
     return float(value)
 
 
-# What a cycle costs and what its plan saves: joules, money and CO2 per part, per shift and per
-# year.
-
-
 def _with_comma(value: object) -> TypeGuard[str]:
     """Whether a text is a number whose decimals follow a comma."""
     return isinstance(value, str) and re.fullmatch(r"-?\d{1,12},\d{1,12}", value) is not None
+
+
+# What a cycle costs and what its plan saves: joules, money and CO2 per part, per shift and per
+# year.
 
 
 def costs_section(analysis: Analysis, costs: Costs) -> str:
@@ -285,13 +287,7 @@ def costs_section(analysis: Analysis, costs: Costs) -> str:
     cycle = production_of(analysis)
     if cycle is None:
         return ""
-    counts = (
-        1.0 / costs.parts_per_cycle,
-        costs.cycles_per_shift(cycle.seconds),
-        costs.cycles_per_year(cycle.seconds),
-    )
-    rows = [_row(cycle.name, cycle.energy, cycle.seconds, counts, costs)]
-    rows += _saved(cycle.savings, counts, costs)
+    rows = [_row(cycle, costs), *_saved(cycle, costs)]
     heads = ("", ">a cycle", ">a part", ">a shift", ">a year")
     origin = (
         analysis.recording.origin
@@ -302,9 +298,25 @@ def costs_section(analysis: Analysis, costs: Costs) -> str:
     return (
         '<section id="costs"><h2>What a cycle costs</h2>'
         f'<p class="hint">Energy of the run is {text(origin)}; savings are predicted, with their '
-        f"90 % interval, at the same number of cycles.{text(notes)}</p>"
-        f"{table(heads, rows, 'What a cycle costs')}{_assumptions(costs, counts)}</section>"
+        f"90 % interval.{text(notes)} {counted_with(costs)}</p>"
+        f"{table(heads, rows, 'What a cycle costs')}</section>"
     )
+
+
+def _counts(pace: float, costs: Costs) -> tuple[float, float, float]:
+    """Cycles of a part, a shift and a year, with so many seconds [s] from one to the next."""
+    a_part = 1.0 / costs.parts_per_cycle
+    return a_part, costs.cycles_per_shift(pace), costs.cycles_per_year(pace)
+
+
+def _yearly_cycles(pace: float, costs: Costs) -> str:
+    return f"<small>{cycles_of_year(pace, costs)}</small>"
+
+
+def cycles_of_year(pace: float, costs: Costs) -> str:
+    """How many cycles a year counts, in words."""
+    made = f"{costs.cycles_per_year(pace):,.0f}".replace(",", " ")
+    return f"{made} cycles of {seconds(pace)}"
 
 
 def idle_money(energy: float, costs: Costs) -> str:
@@ -312,15 +324,13 @@ def idle_money(energy: float, costs: Costs) -> str:
     return money(energy / J_PER_KWH * costs.idle_price, costs.currency)
 
 
-def _row(
-    name: str, energy: float, length: float, counts: tuple[float, ...], costs: Costs
-) -> tuple[str, ...]:
-    cycle = f"<b>{kilowatt_hours(energy)}</b><small>{seconds(length)}</small>"
-    return (
-        text(name),
-        cycle,
-        *(_priced(energy * count, energy * counts[-1], costs) for count in counts),
-    )
+def _row(cycle: Production, costs: Costs) -> tuple[str, ...]:
+    counts = _counts(cycle.pace, costs)
+    shown = f"<b>{kilowatt_hours(cycle.energy)}</b><small>{seconds(cycle.seconds)}</small>"
+    year = cycle.energy * counts[-1]
+    priced = [_priced(cycle.energy * count, year, costs) for count in counts]
+    priced[-1] += _yearly_cycles(cycle.pace, costs)
+    return (text(cycle.name), shown, *priced)
 
 
 def _priced(energy: float, year: float, costs: Costs) -> str:
@@ -414,27 +424,29 @@ def share_between(amount: Amount, whole: float) -> str:
     return f"90 % interval {low:.1f} to {high:.1f} %"
 
 
-def _saved(
-    savings: ProgramSavings | None, counts: tuple[float, ...], costs: Costs
-) -> list[tuple[str, ...]]:
+def _saved(cycle: Production, costs: Costs) -> list[tuple[str, ...]]:
+    savings = cycle.savings
     if savings is None:
         return []
+    pace = savings.total.seconds or cycle.seconds
     parts = [("by its movements", savings.movements)]
     if savings.pauses.seconds > 0.0:
         parts += [("in its pauses", savings.pauses), ("together", savings.total)]
-    return [_saving(name, saving, counts, costs) for name, saving in parts]
+    return [_saving(name, saving, pace, costs) for name, saving in parts]
 
 
-def _saving(where: str, saving: Saving, counts: tuple[float, ...], costs: Costs) -> tuple[str, ...]:
+def _saving(where: str, saving: Saving, pace: float, costs: Costs) -> tuple[str, ...]:
     word, amount = saved_amount(saving).gain()
     doubt = f"<small>{amount.doubt}</small>" if amount.doubt else ""
     cells = [f"<b>{kilowatt_hours(amount.value)}</b>{_between(amount, kilowatt_hours)}{doubt}"]
+    counts = _counts(pace, costs)
     year = costs.money(amount.value * counts[-1])
     for count in counts:
         price = amount.times(count).of(costs.money)
         shown = _shown(price.value, year, costs.currency)
         between = _between(price, _end) if abs(year) >= _NOTHING else ""
         cells.append(f"<b>{text(shown)}</b>{between}")
+    cells[-1] += _yearly_cycles(pace, costs)
     return (f"{word} {where}", *cells)
 
 
@@ -444,23 +456,52 @@ def _between(amount: Amount, show: Callable[[float], str]) -> str:
     return f"<small>{text(show(amount.low))} to {text(show(amount.high))}</small>"
 
 
-def _assumptions(costs: Costs, counts: tuple[float, ...]) -> str:
-    """What the amounts rest on."""
-    a_shift, a_year = (f"{count:,.0f}".replace(",", " ") for count in counts[1:3])
-    made = f"{a_shift} cycles a shift, {a_year} a year."
-    assumed = "" if set(NAMES) <= set(costs.given) else " Give your own with --costs costs.yaml."
-    return f'<p class="hint">{text(made)} {text(given_and_assumed(costs))}{assumed}</p>'
+# What the amounts rest on: a sentence where they stand, and all settings as a table.
 
 
-def given_and_assumed(costs: Costs) -> str:
-    """All settings in two sentences: those that a file gave, and those that are assumed."""
-    shown: dict[bool, list[str]] = {True: [], False: []}
-    for each in SETTINGS:
-        value = getattr(costs, each.name)
-        words = value if isinstance(value, str) else f"{value:g} {each.unit}".strip()
-        shown[each.name in costs.given].append(f"{each.name.replace('_', ' ')} {words}")
-    heads = {True: "Given", False: "Assumed"}
-    return " ".join(f"{heads[own]}: {', '.join(items)}." for own, items in shown.items() if items)
+def counted_with(costs: Costs) -> str:
+    """The settings that move every amount of a year in a sentence (HTML), with the way to all of
+    them.
+    """
+    own = set(NAMES) & set(costs.given)
+    origin = "as your file gives it" if own == set(NAMES) else "partly assumed"
+    words = (
+        f"Counted with {_setting(costs, 'price')}, {costs.shifts_per_day:g} shifts of "
+        f"{costs.shift_hours:g} h on {costs.days_per_year:g} days a year, "
+        f"{100.0 * costs.availability:g} % of them in cycles, {origin if own else 'all assumed'}"
+    )
+    return f'{text(words)}: <a href="#assumed">all values, and how to give yours</a>.'
+
+
+def assumed_section(costs: Costs) -> str:
+    """All settings, those that no file gave named as assumed; it is unfolded on paper."""
+    rows = [
+        (
+            f"{text(each.sentence)}<small>{each.name}</small>",
+            f"<b>{text(_setting(costs, each.name))}</b>"
+            f"<small>{'from your file' if each.name in costs.given else 'assumed'}</small>",
+        )
+        for each in SETTINGS
+    ]
+    return (
+        '<details class="part printed"><summary><h2>What the money rests on</h2></summary>'
+        '<p class="hint" id="assumed">To change a value, write its name and your value as a line '
+        f"of a file that begins with <code>format: {FORMAT}</code>, as <code>price: 0.31</code>, "
+        "and give the file with <code>--costs costs.yaml</code>.</p>"
+        f"{table(('what is counted', '>value'), rows, 'What the money rests on')}</details>"
+    )
+
+
+_MONEY_PER = {"price": "/kWh", "price_night": "/kWh", "demand_price": "/kW", "engineer_hour": "/h"}
+
+
+def _setting(costs: Costs, name: str) -> str:
+    """A setting with its unit."""
+    value = getattr(costs, name)
+    if name in _MONEY_PER:
+        return f"{value:g} {costs.currency}{_MONEY_PER[name]}"
+    unit = next(each.unit for each in SETTINGS if each.name == name)
+    return value if isinstance(value, str) else f"{value:g} {unit}".strip()
 
 
 # The biggest levers as a table: joules, share, money a year, and what would save them.
@@ -472,7 +513,7 @@ def lever_section(analysis: Analysis, costs: Costs) -> str:
     cycle = production_of(analysis)
     if not found or cycle is None:
         return ""
-    yearly = costs.cycles_per_year(cycle.seconds)
+    yearly = costs.cycles_per_year(cycle.pace)
     rows = (
         (
             text(lever.name),

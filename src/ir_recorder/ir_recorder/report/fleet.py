@@ -32,7 +32,8 @@ from ir_recorder.reading.reader import read_recording
 from ir_recorder.report.costs import (
     LEFT_ALONE,
     Costs,
-    given_and_assumed,
+    assumed_section,
+    counted_with,
     idle_money,
     idle_saving,
     idle_sentence,
@@ -305,10 +306,11 @@ def fleet_of_line(members: Sequence[Member], costs: Costs) -> WholeLine | None:
         amount = costs.saving_of_year(cycle)
         if amount is not None and cycle.savings is not None:
             saved.append(amount.times(1.0 / count[robot]))
-            cycles = costs.cycles_per_year(cycle.seconds) / count[robot]
-            common += cycle.savings.total.common * cycles
-    total = sum_of(saved)
-    return None if total.doubt else of_whole_line(total, common, costs)
+            total = cycle.savings.total
+            cycles = costs.cycles_per_year(total.seconds or cycle.seconds) / count[robot]
+            common += total.common * cycles
+    together = sum_of(saved)
+    return None if together.doubt else of_whole_line(together, common, costs)
 
 
 def by_mode(members: Sequence[Member], costs: Costs) -> dict[str, dict[str, float]]:
@@ -341,7 +343,7 @@ def _summed(
     count = {m.robot: sum(other.robot == m.robot for other in members) for m in members}
     found: dict[str, dict[str, float]] = {}
     for member, name, energy in rows:
-        cycles = costs.cycles_per_year(member.cycle.seconds) / count[member.robot]
+        cycles = costs.cycles_per_year(member.cycle.pace) / count[member.robot]
         own = found.setdefault(name, {})
         own[member.robot] = own.get(member.robot, 0.0) + energy * cycles
     return dict(sorted(found.items(), key=lambda item: -sum(item[1].values())))
@@ -396,7 +398,7 @@ def fleet_html(
         f'<p class="subtitle">{text(_origins(members))}; a year of each robot, one cycle after '
         "the other</p>"
         f"</div></header><main>{_tiles(robots, prices)}{_problems(left_out)}{''.join(sections)}"
-        f"{_assumptions(prices)}</main>"
+        f"{assumed_section(prices)}</main>"
         f"<script>{asset('export.js')}\nexportButtons();</script></body></html>"
     )
 
@@ -482,7 +484,8 @@ def _robots(robots: Sequence[Robot], costs: Costs) -> str:
         "and the controller's own timers; intervals hold 90 %, and those of several robots add up "
         "as if all were wrong alike."
     )
-    return f'<p class="hint">{hint} {_apart(robots)}</p>{table(heads, rows, "Robots")}'
+    hint = f"{hint} {counted_with(costs)} {_apart(robots)}"
+    return f'<p class="hint">{hint}</p>{table(heads, rows, "Robots")}'
 
 
 def _apart(robots: Sequence[Robot]) -> str:
@@ -688,10 +691,6 @@ def _problems(left_out: Sequence[str]) -> str:
         return ""
     items = "".join(f"<li>{text(sentence)}</li>" for sentence in left_out)
     return f'<div class="problems calm"><b>Notes</b><ul>{items}</ul></div>'
-
-
-def _assumptions(costs: Costs) -> str:
-    return f'<p class="hint">{text(given_and_assumed(costs))}</p>'
 
 
 # A fleet as columns of numbers, for CSV, Parquet and pandas: SI units, joules of a cycle.

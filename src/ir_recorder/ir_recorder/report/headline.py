@@ -22,7 +22,14 @@ from ir_recorder.analysis.production import (
 )
 from ir_recorder.format.contents import OWN_FACTS, VERSION
 from ir_recorder.reading.recording import Recording
-from ir_recorder.report.costs import NAMES, Costs, idle_saving, share_between, yearly_money
+from ir_recorder.report.costs import (
+    NAMES,
+    Costs,
+    cycles_of_year,
+    idle_saving,
+    share_between,
+    yearly_money,
+)
 from ir_recorder.report.number_text import (
     DASH,
     joules,
@@ -283,7 +290,8 @@ def _yearly(analysis: Analysis, costs: Costs) -> Tile | None:
         else "prices and shifts as given"
     )
     price = yearly_money(costs.money(energy), costs.currency)
-    lines = ("in shifts, without nights and weekends", co2, assumed, cycle.supply)
+    made = f"{cycles_of_year(cycle.pace, costs)} in shifts, without nights and weekends"
+    lines = (made, co2, assumed, cycle.supply)
     return Tile("a year of such cycles", price, lines)
 
 

@@ -13,7 +13,13 @@ from ir_msgs_py.savings import ProgramPoint
 from ir_recorder.analysis import Analysis, Finding, Tolerances
 from ir_recorder.analysis.indirect import agreement
 from ir_recorder.report.charts import front_section, joule_bars
-from ir_recorder.report.costs import Costs, clock_section, costs_section, lever_section
+from ir_recorder.report.costs import (
+    Costs,
+    assumed_section,
+    clock_section,
+    costs_section,
+    lever_section,
+)
 from ir_recorder.report.data import page_data
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import notes, run_tiles, source, subtitle, tiles, verdict
@@ -112,6 +118,7 @@ def report_html(
         "costs": costs_section(analysis, prices),
         "front": folded(front_section(analysis, front)),
         "levers": lever_section(analysis, prices),
+        "assumed": assumed_section(prices),
         "around": clock_section(analysis, prices),
         "line": line_section(of_recording(analysis, prices), prices),
         "checks": check_table(checks),

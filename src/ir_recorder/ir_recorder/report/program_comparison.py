@@ -17,7 +17,9 @@ from ir_recorder.report.charts import Point, front_chart
 from ir_recorder.report.costs import (
     J_PER_KWH,
     Costs,
-    given_and_assumed,
+    assumed_section,
+    counted_with,
+    cycles_of_year,
     payback,
     share_between,
     yearly_end,
@@ -48,11 +50,12 @@ from ir_values.files import ANYWHERE, FileRoots
 
 @dataclass(frozen=True)
 class Year:
-    """A program in production: its cycles, the energy [J] of a shift and of a year, and what it
-    saves a year [J]. fit_a_shift: cycles that it can make; fewer where it takes longer than those
-    that are counted.
+    """A program in production: seconds [s] from one cycle to the next, its cycles, the energy [J]
+    of a shift and of a year, and what it saves a year [J]. fit_a_shift: cycles that it can make;
+    fewer where it takes longer than those that are counted.
     """
 
+    pace: float
     cycles_a_shift: float
     cycles_a_year: float
     fit_a_shift: float
@@ -64,15 +67,15 @@ class Year:
 def year_of(found: BeforeAfter, side: Side, costs: Costs) -> Year:
     """A side in production: as many cycles as today's program makes, or as the line asks for."""
     asked = side.cycle_time if side.cycle_time > 0.0 and side is not found.today else 0.0
-    seconds = asked or found.today.report.duration
-    shift = costs.cycles_per_shift(seconds)
-    year = costs.cycles_per_year(seconds)
+    pace = asked or found.today.report.duration
+    shift = costs.cycles_per_shift(pace)
+    year = costs.cycles_per_year(pace)
     report = side.report
     saving = side.saving
     cycle = Amount(report.energy, report.energy_low, report.energy_high)
     saved = saved_amount(saving)
     fit = costs.cycles_per_shift(max(report.duration, 1e-9))
-    return Year(shift, year, fit, cycle.times(shift), cycle.times(year), saved.times(year))
+    return Year(pace, shift, year, fit, cycle.times(shift), cycle.times(year), saved.times(year))
 
 
 # Figures of today's program and of the planner's as tables: each energy with its 90 % interval.
@@ -88,7 +91,8 @@ def tiles(found: BeforeAfter, costs: Costs) -> str:
     report = found.planned.report
     today = found.today.report
     saving = side.saving
-    word, year = year_of(found, side, costs).saved.gain()
+    counted = year_of(found, side, costs)
+    word, year = counted.saved.gain()
     _, cycle = saved_amount(saving).gain()
     sure = "" if saving.certain else OPEN
     between = share_between(cycle, saving.common)
@@ -98,7 +102,8 @@ def tiles(found: BeforeAfter, costs: Costs) -> str:
             f"{word} a year",
             yearly_money(costs.money(year.value), costs.currency),
             _money(year, costs),
-            payback(year_of(found, side, costs).saved, costs),
+            cycles_of_year(counted.pace, costs),
+            payback(counted.saved, costs),
         ),
         (
             f"CO2 {word} a year",
@@ -218,7 +223,7 @@ def assumptions(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
         "as the line asks for, and there today's program waits at its end as well; what is left "
         "of a shift counts nothing."
     )
-    return f'<p class="hint">{text(said)}</p><p class="hint">{text(given_and_assumed(costs))}</p>'
+    return f'<p class="hint">{counted_with(costs)}</p><p class="hint">{text(said)}</p>'
 
 
 def _cell(value: str, *smaller: str) -> str:
@@ -354,6 +359,7 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
         "figures": figure_table(found, prices),
         "assumptions": assumptions(found, cell, prices),
         "line": _line(found, cell, prices),
+        "assumed": assumed_section(prices),
         "changes": change_table(found, prices),
         "hops": hop_table(found),
         "front": front_chart([_point(side) for side in there]),

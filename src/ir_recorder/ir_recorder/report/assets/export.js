@@ -70,6 +70,15 @@ function barsToSvg(place) {
   return svg;
 }
 
+/* What is folded on a screen and belongs on paper. */
+const folded = () => [...document.querySelectorAll("details.printed")];
+let unfolded = [];
+addEventListener("beforeprint", () => {
+  unfolded = folded().filter((part) => !part.open);
+  for (const part of unfolded) part.open = true;
+});
+addEventListener("afterprint", () => { for (const part of unfolded) part.open = false; });
+
 function exportButtons() {
   const button = (label, name, act) => {
     const element = document.createElement("button");

@@ -1,0 +1,50 @@
+"""Law: what a plan saves a year is one figure, in the comparison and in the report of the plan."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ir_cli.ros.plan_recording import ProgramRequest, write_plan
+from ir_planner import Planner
+from ir_planner.before_after import before_after_common
+from ir_recorder import analyse, findings, read_recording
+from ir_recorder.analysis.production import production_of
+from ir_recorder.report import report_html
+from ir_recorder.report.costs import Costs, yearly_money
+from ir_recorder.report.program_comparison import before_after_html, year_of
+
+STATIONS = ("p1", "p2", "home")
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_comparison_and_report_of_a_plan_show_one_saving(
+    planner: Planner, tmp_path: Path, seed: int
+) -> None:
+    draw = np.random.default_rng(seed).uniform
+    costs = Costs(price=draw(0.05, 1.0), shift_hours=draw(4.0, 8.0), days_per_year=draw(50, 300))
+    start = planner.cell.machine_home
+    compared = before_after_common(planner, STATIONS, start)
+    plan = planner.plan_program(stations=STATIONS, start=start, savings=True)
+    request = ProgramRequest(STATIONS, savings=True)
+    file = write_plan(tmp_path / "plan.mcap", plan, request, planner)
+    analysis = analyse(read_recording(file))
+    cycle = production_of(analysis)
+    assert cycle is not None
+
+    year = year_of(compared, compared.planned, costs)
+    found = costs.saving_of_year(cycle)
+    assert found is not None
+    assert found.value == pytest.approx(year.saved.value, rel=1e-9)
+    assert (found.low, found.high) == pytest.approx((year.saved.low, year.saved.high), rel=1e-9)
+
+    # the same program, as free as it was planned, in the column of that name
+    free = next(side for side in compared.sides if side.name == "free")
+    energy = costs.energy_of_year(cycle)
+    assert energy.value == pytest.approx(year_of(compared, free, costs).energy.value, rel=1e-9)
+
+    shown = yearly_money(costs.money(found.value), costs.currency)
+    assert shown in before_after_html(compared, planner.cell, costs)
+    assert shown in report_html(analysis, findings(analysis), costs=costs)
