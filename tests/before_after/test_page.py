@@ -17,7 +17,13 @@ from ir_cli.main import main
 from ir_msgs_py.savings import BeforeAfter
 from ir_planner import Planner
 from ir_recorder.report.costs import J_PER_KWH, Costs, money
-from ir_recorder.report.number_text import kilowatt_hours, millimetres, number, watts
+from ir_recorder.report.number_text import (
+    kilograms,
+    kilowatt_hours,
+    millimetres,
+    span_of,
+    watts,
+)
 from ir_recorder.report.program_comparison import (
     before_after_columns,
     before_after_html,
@@ -165,10 +171,11 @@ def test_every_figure_is_one_value_on_the_page_in_the_table_and_of_the_command(
         assert said["peak_watts"] == row["peak_w"]
         assert said["clearance"] == row["clearance_m"]
         shown = [
-            *(kilowatt_hours(each) for each in joules_shown),
+            kilowatt_hours(joules_shown[0]),
+            span_of(*joules_shown[1:], kilowatt_hours),
             kilowatt_hours(row["year_kwh"] * J_PER_KWH),
             money(row["year_money"], "EUR"),
-            number(row["year_co2_kg"], "kg"),
+            kilograms(row["year_co2_kg"]),
             watts(row["peak_w"]),
             millimetres(row["clearance_m"]),
         ]

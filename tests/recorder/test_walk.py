@@ -106,7 +106,7 @@ def quantities(analysis: Analysis, cycle: Production, costs: Costs) -> dict[str,
         "a year of such cycles: robot": cycle.energy * year * price,
     }
     for lever in levers(analysis):
-        found[f"{lever.name}: of a cycle, at most"] = lever.joules
+        found[f"{lever.name}: a cycle, at most"] = lever.joules
         found[f"{lever.name}: a year, at most"] = lever.joules * year * price
         found[f"{lever.name}: a year, at most a year"] = lever.joules * year * price
         found[f"{lever.name}: all a year"] = lever.joules * year

@@ -26,11 +26,12 @@ from ir_recorder.errors import RecorderError
 from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import (
     DASH,
+    kilograms,
     kilowatt_hours,
-    number,
     seconds,
     share,
     significant,
+    span_of,
     text,
     watts,
 )
@@ -290,14 +291,14 @@ def costs_section(analysis: Analysis, costs: Costs) -> str:
     rows = [_row(cycle, costs), *_saved(cycle, costs)]
     heads = ("", ">a cycle", ">a part", ">a shift", ">a year")
     origin = (
-        analysis.recording.origin
+        f"Energy of the run is {analysis.recording.origin}"
         if analysis.program is not None
-        else "not there: nothing was driven"
+        else "Nothing was driven: energy is that of the plan, predicted"
     )
     notes = "".join(f" {note[0].upper()}{note[1:]}." for note in cycle.notes)
     return (
         '<section id="costs"><h2>What a cycle costs</h2>'
-        f'<p class="hint">Energy of the run is {text(origin)}; savings are predicted, with their '
+        f'<p class="hint">{text(origin)}; savings are predicted, with their '
         f"90 % interval.{text(notes)} {counted_with(costs)}</p>"
         f"{table(heads, rows, 'What a cycle costs')}</section>"
     )
@@ -338,7 +339,7 @@ def _priced(energy: float, year: float, costs: Costs) -> str:
     shown = _shown(costs.money(energy), costs.money(year), costs.currency)
     return (
         f"<b>{text(shown)}</b><small>{kilowatt_hours(energy)}</small>"
-        f"<small>{number(costs.co2(energy), 'kg')} CO2</small>"
+        f"<small>{kilograms(costs.co2(energy))} CO2</small>"
     )
 
 
@@ -453,7 +454,7 @@ def _saving(where: str, saving: Saving, pace: float, costs: Costs) -> tuple[str,
 def _between(amount: Amount, show: Callable[[float], str]) -> str:
     if amount.high <= amount.low:
         return ""
-    return f"<small>{text(show(amount.low))} to {text(show(amount.high))}</small>"
+    return f"<small>{text(span_of(amount.low, amount.high, show))}</small>"
 
 
 # What the amounts rest on: a sentence where they stand, and all settings as a table.
@@ -524,7 +525,7 @@ def lever_section(analysis: Analysis, costs: Costs) -> str:
         )
         for lever in found
     )
-    heads = ("lever", ">of a cycle, at most", ">share", ">a year, at most", "what would save them")
+    heads = ("lever", ">a cycle, at most", ">share", ">a year, at most", "what would save them")
     return (
         '<section id="levers"><h2>The biggest levers</h2><p class="hint">Upper bounds from '
         "figures of this "

@@ -47,11 +47,12 @@ from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import (
     DASH,
     ENGLISH,
+    kilograms,
     kilowatt_hours,
-    number,
     percent,
     seconds,
     significant,
+    span_of,
     text,
     watts,
 )
@@ -414,7 +415,7 @@ def _tiles(robots: Sequence[Robot], costs: Costs) -> str:
     price = yearly_money(costs.money(yearly.value), costs.currency)
     found = [
         Tile("energy a year", kilowatt_hours(yearly.value), (counted(len(summed), "robot"),)),
-        Tile("costs a year", price, (f"{number(costs.co2(yearly.value), 'kg')} of CO2",)),
+        Tile("costs a year", price, (f"{kilograms(costs.co2(yearly.value))} of CO2",)),
     ]
     if saved:
         ends = [yearly_end(costs.money(end)) for end in (of_it.low, of_it.high)]
@@ -610,7 +611,7 @@ def _yearly(amount: Amount, costs: Costs) -> tuple[str, str, str]:
     return (
         f"<b>{text(kilowatt_hours(amount.value))}</b>{_between(amount, kilowatt_hours)}",
         text(yearly_money(costs.money(amount.value), costs.currency)),
-        text(number(costs.co2(amount.value), "kg")),
+        text(kilograms(costs.co2(amount.value))),
     )
 
 
@@ -630,7 +631,7 @@ def _saved(amount: Amount | None, costs: Costs) -> str:
 def _between(amount: Amount, show: Callable[[float], str]) -> str:
     if amount.high <= amount.low:
         return ""
-    return f"<small>{text(show(amount.low))} to {text(show(amount.high))}</small>"
+    return f"<small>{text(span_of(amount.low, amount.high, show))}</small>"
 
 
 def _matrix(what: str, found: Mapping[str, Mapping[str, float]], robots: Sequence[Robot]) -> str:

@@ -33,12 +33,13 @@ from ir_recorder.report.costs import (
 from ir_recorder.report.number_text import (
     DASH,
     joules,
+    kilograms,
     kilowatt_hours,
     millimetres,
-    number,
     percent,
     seconds,
     share,
+    span_of,
     text,
     watts,
 )
@@ -171,15 +172,13 @@ def _planned(analysis: Analysis) -> list[Tile]:
         within = planned_interval(analysis.recording) if part == "whole" else None
         if found is None:
             continue
-        spread = (
-            f"90 % interval {joules(within[0])} to {joules(within[1])}"
-            if within is not None
-            else ""
-        )
+        spread = f"90 % interval {span_of(*within, kilowatt_hours)}" if within is not None else ""
         why = _says(one_sided(found.energy, *within)) if within is not None else ""
         tiles.append(
             Tile(
-                name, joules(found.energy), (f"in {seconds(found.seconds)}, predicted", spread, why)
+                name,
+                kilowatt_hours(found.energy),
+                (f"{joules(found.energy)} in {seconds(found.seconds)}, predicted", spread, why),
             )
         )
     near = millimetres(planned_clearance(steps))
@@ -283,7 +282,7 @@ def _yearly(analysis: Analysis, costs: Costs) -> Tile | None:
     if cycle is None:
         return None
     energy = costs.energy_of_year(cycle).value
-    co2 = f"{kilowatt_hours(energy)}, {number(costs.co2(energy), 'kg')} CO2"
+    co2 = f"{kilowatt_hours(energy)}, {kilograms(costs.co2(energy))} CO2"
     assumed = (
         "prices and shifts assumed"
         if set(costs.given) != set(NAMES)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Callable
 from html import escape
 from unicodedata import category
 
@@ -60,6 +61,13 @@ def kilowatt_hours(value: float) -> str:
     return f"{_fixed(kwh, 0) if abs(kwh) >= 100.0 else significant(kwh, 3)} kWh"
 
 
+def kilograms(value: float) -> str:
+    """kg with three significant digits, whole ones from 100 on."""
+    if not math.isfinite(value):
+        return DASH
+    return f"{_fixed(value, 0) if abs(value) >= 100.0 else significant(value, 3)} kg"
+
+
 def seconds(value: float) -> str:
     """Seconds with two decimals, from ten minutes on as minutes."""
     if not math.isfinite(value):
@@ -104,6 +112,18 @@ def interval(low: float, high: float, unit: str) -> str:
     if math.isfinite(low) and math.isfinite(high):
         return f"{number(low, unit)} to {number(high, unit)}"
     return DASH
+
+
+def span_of(low: float, high: float, show: Callable[[float], str]) -> str:
+    """Two ends with their unit, once where it is the same: "609 to 839 kWh"; no end is broken
+    across lines.
+    """
+    first = show(low)
+    last = show(high)
+    number_of, apart, unit = first.rpartition(" ")
+    if apart and unit.isalpha() and last.endswith(f" {unit}"):
+        first = number_of
+    return " to ".join(end.replace(" ", "\u00a0") for end in (first, last))
 
 
 def mode_words(name: str) -> str:

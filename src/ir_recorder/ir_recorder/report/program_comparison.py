@@ -31,10 +31,11 @@ from ir_recorder.report.number_text import (
     DASH,
     ENGLISH,
     joules,
+    kilograms,
     kilowatt_hours,
     millimetres,
-    number,
     seconds,
+    span_of,
     text,
     watts,
 )
@@ -107,14 +108,14 @@ def tiles(found: BeforeAfter, costs: Costs) -> str:
         ),
         (
             f"CO2 {word} a year",
-            number(costs.co2(year.value), "kg"),
+            kilograms(costs.co2(year.value)),
             f"{kilowatt_hours(year.value)} {'less' if word == 'saved' else 'more'}",
         ),
         ("cycle time", seconds(report.duration), f"today {seconds(today.duration)}", side.name),
         (
             "peak power",
             watts(report.peak_power),
-            _between(*side.peak, watts),
+            span_of(*side.peak, watts),
             f"today {watts(today.peak_power)}",
         ),
     )
@@ -151,7 +152,7 @@ def figure_table(found: BeforeAfter, costs: Costs) -> str:
         (
             "peak power",
             *(
-                _of(side, watts(side.report.peak_power), _between(*side.peak, watts))
+                _of(side, watts(side.report.peak_power), span_of(*side.peak, watts))
                 for side in sides
             ),
         ),
@@ -173,7 +174,7 @@ def change_table(found: BeforeAfter, costs: Costs) -> str:
 
 def _change(k: int, change: Change, cycles: float, costs: Costs) -> tuple[str, ...]:
     saving = change.saving
-    between = _between(saving.saved_low, saving.saved_high, kilowatt_hours)
+    between = span_of(saving.saved_low, saving.saved_high, kilowatt_hours)
     return (
         str(k),
         text(change.name),
@@ -199,7 +200,7 @@ def _keyed(side: Side) -> Sequence[tuple[tuple[str, int], str]]:
     for hop in side.hops:
         times[hop.name] = times.get(hop.name, 0) + 1
         mode = hop.power_mode.replace(">", ", ").replace("_", " ").lower()
-        between = _between(hop.energy_low, hop.energy_high, joules)
+        between = span_of(hop.energy_low, hop.energy_high, joules)
         cell = _cell(
             joules(hop.energy), between, f"{seconds(hop.seconds)}{f', {mode}' if mode else ''}"
         )
@@ -284,7 +285,7 @@ def _count(cycles: float) -> str:
 def _amount(amount: Amount | None, show: Show) -> str:
     if amount is None:
         return DASH
-    return _cell(show(amount.value), _between(amount.low, amount.high, show))
+    return _cell(show(amount.value), span_of(amount.low, amount.high, show))
 
 
 def _cost(energy: Amount | None, costs: Costs) -> str:
@@ -294,22 +295,18 @@ def _cost(energy: Amount | None, costs: Costs) -> str:
 
 
 def _co2(year: Year | None, costs: Costs) -> str:
-    return _amount(year.energy.of(costs.co2) if year else None, lambda value: number(value, "kg"))
+    return _amount(year.energy.of(costs.co2) if year else None, kilograms)
 
 
 def _money(energy: Amount, costs: Costs) -> str:
     amount = energy.of(costs.money)
-    return f"{yearly_end(amount.low)} to {yearly_end(amount.high)}"
+    return span_of(amount.low, amount.high, yearly_end)
 
 
 def _proof(side: Side) -> str:
     if not side.found:
         return text(f"none: {side.problem}")
     return '<b class="good">proved</b>' if side.certified else '<b class="bad">not certified</b>'
-
-
-def _between(low: float, high: float, show: Show) -> str:
-    return f"{show(low)} to {show(high)}"
 
 
 # One HTML file: today's program and the planner's, for those who pay and for those who change

@@ -86,10 +86,13 @@ def rows(flows: EnergyFlows) -> list[tuple[str, str, float]]:
 
 def _table(flows: EnergyFlows) -> str:
     cells = (
-        (text(source), text(to), joules(value), share(value, flows.mains))
+        (
+            text(f"{source} to {to}"),
+            f"<b>{joules(value)}</b><small>{share(value, flows.mains)}</small>",
+        )
         for source, to, value in rows(flows)
     )
-    return table(("from", "to", ">energy", ">of the mains"), cells, caption="Energy flows")
+    return table(("flow", ">energy, and share of the mains"), cells, caption="Energy flows")
 
 
 def sankey(flows: EnergyFlows) -> str:
