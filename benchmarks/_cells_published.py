@@ -23,7 +23,8 @@ class PublishedModel:
 
     def __init__(self, instance: Instance) -> None:
         self.instance = instance
-        self.program = p = LinearProgram()
+        p = LinearProgram()
+        self.program = p
         far = 2.0 * len(instance.robots) * instance.cycle
         activities = [a.number for r in instance.robots for a in (*r.stops, *r.hops)]
         self.energy = {a: p.variable(0.0, _LARGE_ENERGY, cost=1.0) for a in activities}
@@ -51,7 +52,8 @@ class PublishedModel:
             for mode, on in modes.items():
                 p.row({self.duration[v]: 1.0, on: -robot.modes[mode]}, low=0.0)
             for place in stop.places:
-                here = self.place[v, place.number] = p.binary()
+                here = p.binary()
+                self.place[v, place.number] = here
                 for mode, on in modes.items():
                     terms = {self.duration[v]: place.power[mode], self.energy[v]: -1.0}
                     p.row(

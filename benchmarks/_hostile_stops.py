@@ -66,7 +66,8 @@ class Cell:
         self.modbus = modbus
         self.q: Any = None
         self.home: Any = None
-        self.heard = self.stamp = 0
+        self.heard = 0
+        self.stamp = 0
         self._mark: Any = None
         self.moved: set[int] = set()
         self.goals: list[Any] = []

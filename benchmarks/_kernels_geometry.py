@@ -112,7 +112,8 @@ def _speed(cell: Cell, rng: np.random.Generator, effort: Effort) -> tuple[list[R
     name = cell.name
     coal = Coal(model, capsules, bodies)
     bullet = Bullet(cell, model, bodies)
-    ours = theirs = np.inf
+    ours = np.inf
+    theirs = np.inf
     for _ in range(effort.turns):  # in turns: the processor's clock changes
         ours = min(ours, best(lambda: model.min_distance(path), SAMPLES, effort.repetitions))
         theirs = min(theirs, best(lambda: coal.compute_all(path[:COAL_SAMPLES]), COAL_SAMPLES, 5))

@@ -54,7 +54,8 @@ class Coal:
             self.geometry.addCollisionPair(
                 pinocchio.CollisionPair(index[pair.body_a], index[other])
             )
-        self.data, self.geometry_data = self.model.createData(), self.geometry.createData()
+        self.data = self.model.createData()
+        self.geometry_data = self.geometry.createData()
 
     def compute(self, q: FloatArray) -> None:
         """All distances at one configuration."""

@@ -37,7 +37,8 @@ BUS_48_V = DcLink(
 
 def _turn(axis: int, angle: float) -> FloatArray:
     turn = np.eye(4)
-    a, b = (axis + 1) % 3, (axis + 2) % 3
+    a = (axis + 1) % 3
+    b = (axis + 2) % 3
     turn[a, a] = turn[b, b] = np.cos(angle)
     turn[b, a] = np.sin(angle)
     turn[a, b] = -turn[b, a]
@@ -67,7 +68,11 @@ def _by_dh(
     parallel to the base at 0.
     """
     at = base
-    places, axes, masses, centres, inertias = [], [], [], [], []
+    places = []
+    axes = []
+    masses = []
+    centres = []
+    inertias = []
     for (offset, d, a, alpha), (mass, centre, inertia) in zip(rows, bodies, strict=True):
         axes.append(at[:3, 2])
         places.append(at[:3, 3])

@@ -125,7 +125,8 @@ f"{SLOWED}", "change, median", *interval(median, x), len(x), "movements",
 
 def _lowered(rows: Sequence[Row]) -> Statement:
     """Of the movements that save as much as section V says, how many lower the tool."""
-    much = [row for row in rows if len(x := change([row], SAME_TIME)) and x[0] <= LOW]
+    changes = [(row, change([row], SAME_TIME)) for row in rows]
+    much = [row for row, found in changes if len(found) and found[0] <= LOW]
     some = percent(wilson(sum(row["direction"] == "down" for row in much), len(much)))
     says = f"{SAME_TIME}: of those that save {-LOW:g} % or more, what lowers the tool"
     return Statement(says, "share of the movements", *some, len(much), "movements", "%")

@@ -64,7 +64,8 @@ def _upright(planner: Planner, rng: np.random.Generator) -> FloatArray:
     while True:
         around, yaw = rng.uniform(-np.pi, np.pi, 2)
         radius = rng.uniform(0.3, 0.7) * reach
-        c, s = np.cos(yaw), np.sin(yaw)
+        c = np.cos(yaw)
+        s = np.sin(yaw)
         pose = np.eye(4)
         pose[:3, :3] = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ _DOWN
         place = (radius * np.cos(around), radius * np.sin(around), rng.uniform(0.1, 0.5) * reach)

@@ -61,7 +61,8 @@ class _Judge:
         q = after.sample(np.linspace(0.0, after.duration, _INSTANTS)).q
         if any((self._coal.distances(one) <= self._kept).any() for one in q):
             wrong.append("a pair is too near")
-        left, right = _hermite(before), _hermite(after)
+        left = _hermite(before)
+        right = _hermite(after)
         jumps = [np.abs(right(0.0, nu=k) - left(at, nu=k)).max() for k in range(3)]
         if any(jump > most for jump, most in zip(jumps, _JUMPS, strict=True)):
             wrong.append("it jumps where the driven movement is left")

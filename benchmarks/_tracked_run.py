@@ -90,7 +90,8 @@ class TrackedRun:
         """
         stretch = self._along(trajectory)
         meter = PowerMeter(self.plant, DT)
-        torque, base, tool = self._torques(stretch), *self._standing(stretch)
+        torque = self._torques(stretch)
+        base, tool = self._standing(stretch)
         meter.add(base, tool, True, len(torque))
         meter.settle(Work(stretch.qd, torque))
         return meter.reading().energy
@@ -129,7 +130,8 @@ class TrackedRun:
 
     def _pass(self, stretch: _Stretch) -> None:
         """Let a stretch take place: torques, then the meter, reading by reading."""
-        torque, base, tool = self._torques(stretch), *self._standing(stretch)
+        torque = self._torques(stretch)
+        base, tool = self._standing(stretch)
         count = len(torque)
         on = stretch.mode is Mode.STAND_ON_MOTORS
         for first in range(0, count, READING):

@@ -68,7 +68,8 @@ class Judge:
         return min(found, key=lambda entry: entry[0], default=(np.inf, set()))
 
     def _meet(self, a: str, b: str, poses: list[FloatArray]) -> bool:
-        (here, first), (there, second) = self._ball(a, poses), self._ball(b, poses)
+        here, first = self._ball(a, poses)
+        there, second = self._ball(b, poses)
         d = here - there
         return float(d @ d) <= (first + second) ** 2
 
@@ -127,7 +128,8 @@ def measured(asked: Asked) -> Found:
     found = Found()
     total = Tally()
     clear = Tally()
-    for k, (name, load) in enumerate(places := _places(asked.cells)):
+    places = _places(asked.cells)
+    for k, (name, load) in enumerate(places):
         simulation = make_simulation(name, load)
         judge = Judge(simulation)
         share = slice(k, None, len(places))

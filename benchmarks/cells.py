@@ -352,7 +352,8 @@ def row_of(element: ET.Element, answer: CellAnswer, seconds: float, *, peer: boo
     found = faults(element, schedule)
     if schedule and abs(energy(element, schedule) - answer.energy) > 1e-6 * answer.energy:
         found.append("its energy is another")
-    published = published_seconds = np.nan
+    published = np.nan
+    published_seconds = np.nan
     if peer:
         begin = time.process_time()
         published = PublishedModel(answer.instance).solve(seconds).cost

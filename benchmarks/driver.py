@@ -148,7 +148,8 @@ def energy_row(cell: Cell, seconds: float) -> dict[str, Any]:
     home = simulation.executor.command
     places = (home + np.array([0.8, 0.2, -0.2, 0.4, -0.3, 0.5]), home)
     rest = np.zeros((1, 6))
-    total = energy = 0.0
+    total = 0.0
+    energy = 0.0
     for k in range(1, round(seconds / TICK)):
         if k % 1500 == 0:  # every 15 s, and 60 s of Bus Power Off in every 5 min
             press("ab" if k % 30_000 == 24_000 else "-ab")(simulation)

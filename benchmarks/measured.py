@@ -166,7 +166,9 @@ def _strangers(count: int) -> tuple[list[dict[str, Any]], list[Claim], list[bool
     rows = []
     shares = []
     inside: list[bool] = []
-    misled = taken = alarms = 0
+    misled = 0
+    taken = 0
+    alarms = 0
     for seed in range(count):
         robot = stranger(seed)
         model, prior = _model(robot.known)
@@ -359,7 +361,8 @@ def _tx40(folder: Path) -> tuple[list[Row], list[Claim]]:
         trace = _tx40_trace(folder, robot)
         samples = _samples(trace, robot, prior, (), metered=False)
         ends = np.linspace(samples.time[0], samples.time[-1] + samples.step, LAST + 1)
-        first, last = samples.part(ends[0], ends[-2]), samples.part(ends[-2], ends[-1])
+        first = samples.part(ends[0], ends[-2])
+        last = samples.part(ends[-2], ends[-1])
         known = Estimate([first], ["first"], model, prior, motors=True)
         known.result("tx40")
         whole = Estimate([first, last], ["first", "last"], model, prior, motors=True)

@@ -109,7 +109,8 @@ def damaged_messages(message: bytes) -> list[bytes]:
 
 def outcome_of(read: Read, damaged: Sequence[bytes]) -> tuple[int, int]:
     """How many damaged messages end in an error with a sentence, and in any other exception."""
-    refused = other = 0
+    refused = 0
+    other = 0
     for message in damaged:
         try:
             read([message])
@@ -340,7 +341,9 @@ def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
     def of(case: str) -> list[dict[str, Any]]:
         return [row for row in rows if row["case"] == case]
 
-    (stream,), (report,), (again,) = of("stream"), of("report"), of("replan")
+    (stream,) = of("stream")
+    (report,) = of("report")
+    (again,) = of("replan")
     own, *others = of("reader")
     peer = min(row["us_per_message"] for row in others)
     lost = max(row["lost_s"] for row in of("killed"))

@@ -102,7 +102,8 @@ def _child(there: Connection, prepare: Callable[[], Prepared]) -> None:
             total = 0.0
             most = max(QUIET_S, 2.0 * spent)
             while total < most:
-                spent = min(spent, again := _timed_scaling_measure(prepared.call))
+                again = _timed_scaling_measure(prepared.call)
+                spent = min(spent, again)
                 total += again
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
         there.send((prepared.size, Cost(spent, max(peak - before, 0) / 1e6)))

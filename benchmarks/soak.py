@@ -60,7 +60,10 @@ class Shift:
         self._processes = processes
         self._port = port
         self._kept = kept
-        self.programs = self.calls = self.presses = self.refused = 0
+        self.programs = 0
+        self.calls = 0
+        self.presses = 0
+        self.refused = 0
 
     def has(self) -> dict[str, float]:
         """Memory [MB], descriptors and threads of each node, and what all have logged [kB]."""

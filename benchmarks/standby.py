@@ -56,7 +56,8 @@ class Controller:
             wake = end  # asked for on motors, motors change nothing, and the timer goes on
         if (not orders or orders[0][0] > self.timer) and wake > self.timer:
             orders = [(self.timer, 0), *((at, k) for at, k in orders if k != 0)]
-        now = energy = 0.0
+        now = 0.0
+        energy = 0.0
         mode = -1
         for at, k in orders:
             start = max(at, now)

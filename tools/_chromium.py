@@ -45,7 +45,11 @@ ANSWER_SECONDS = 60.0  # a busy machine draws 3D in software
 
 def chromium() -> str | None:
     """The browser that is installed, None without one."""
-    return next((path for name in NAMES if (path := shutil.which(name))), None)
+    for name in NAMES:
+        path = shutil.which(name)
+        if path is not None:
+            return path
+    return None
 
 
 def _end_with_parent() -> None:

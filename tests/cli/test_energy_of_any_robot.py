@@ -52,7 +52,8 @@ def motion(robot: RobotModel, seconds: float = 20.0) -> Samples:
     step = 0.01
     time = (np.arange(int(seconds / step)) + 0.5) * step
     q = np.tile(robot.machine_home, (len(time), 1))
-    qd, qdd = np.zeros_like(q), np.zeros_like(q)
+    qd = np.zeros_like(q)
+    qdd = np.zeros_like(q)
     for begin in np.arange(0.5, seconds - 2.0, 2.0):
         rows = (time >= begin) & (time < begin + 1.6)
         x = 2.0 * np.pi * (time[rows] - begin)[:, None] / 1.6

@@ -61,7 +61,8 @@ def browser() -> Iterator[Any]:
     spec = importlib.util.spec_from_file_location("_chromium", TOOL)
     assert spec is not None
     assert spec.loader is not None
-    tool = sys.modules["_chromium"] = importlib.util.module_from_spec(spec)
+    tool = importlib.util.module_from_spec(spec)
+    sys.modules["_chromium"] = tool
     spec.loader.exec_module(tool)
     if tool.chromium() is None:
         pytest.skip("needs Chromium: apt install chromium")

@@ -62,7 +62,8 @@ def test_a_large_mesh_of_a_link_is_contained_and_told(
     slabs, _ = meshes.triangles("link.obj")
     assert "600 triangles are taken as the hulls of 32 slabs" in meshes.notes[0]
     assert {tuple(p) for p in slabs.reshape(-1, 3)} <= {tuple(p) for p in triangles.reshape(-1, 3)}
-    low, high = slabs.reshape(-1, 3).min(axis=0), slabs.reshape(-1, 3).max(axis=0)
+    low = slabs.reshape(-1, 3).min(axis=0)
+    high = slabs.reshape(-1, 3).max(axis=0)
     assert (low <= triangles.reshape(-1, 3).min(axis=0)).all()
     assert (high >= triangles.reshape(-1, 3).max(axis=0)).all()
 

@@ -199,7 +199,8 @@ def with_coupling(rows: str) -> RobotModel:
 
 def test_a_wrist_coupling_is_read_and_none_is_the_default(robot: RobotModel) -> None:
     turns = np.eye(6)
-    turns[5, 4], turns[4, 3] = 1.0, -0.5
+    turns[5, 4] = 1.0
+    turns[4, 3] = -0.5
     coupled = with_coupling("[[6, 5, 1.0], [5, 4, -0.5]]")
     assert np.array_equal(coupled.motor_turns, turns)
     assert coupled.coupled

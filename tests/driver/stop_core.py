@@ -44,13 +44,15 @@ class Core:
     def clone(self) -> Core:
         """The same state again."""
         new = copy.copy(self)
-        new.plc = plc = copy.copy(self.plc)
+        plc = copy.copy(self.plc)
+        new.plc = plc
         plc.stop = copy.copy(plc.stop)
         plc._ages = dict(plc._ages)
         plc._rose = dict(plc._rose)
         plc._gave = {bit: set(givers) for bit, givers in plc._gave.items()}
         plc.off_by = set(plc.off_by)
-        new.control = control = copy.copy(self.control)
+        control = copy.copy(self.control)
+        new.control = control
         control._plc = plc
         control.modes = copy.copy(control.modes)
         control.latches = copy.copy(control.latches)
@@ -143,10 +145,15 @@ class Core:
 
     def key(self) -> tuple[Any, ...]:
         """All that decides what may happen next, without what only counts."""
-        plc, control, stop = self.plc, self.control, self.plc.stop
+        plc = self.plc
+        control = self.control
+        stop = self.plc.stop
         number = stop.number
-        latches, pauses, modes = control.latches, control.pauses, control.modes
-        conf, drives = plc.rose("conf_mess"), plc.rose("drives_on")
+        latches = control.latches
+        pauses = control.pauses
+        modes = control.modes
+        conf = plc.rose("conf_mess")
+        drives = plc.rose("drives_on")
         ages = tuple(sorted((bit, round(age, 3)) for bit, age in plc._ages.items()))
         return (
             stop.state, plc.raw, plc.levels, plc.rest, plc._stuck, ages, round(plc._up, 3) < 0.02,

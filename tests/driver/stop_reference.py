@@ -24,8 +24,10 @@ class Signal:
     """A level with the message and the time at which it changed, and the level that counts."""
 
     def __init__(self) -> None:
-        self.level = self.counted = False
-        self.message = self.changed = 0
+        self.level = False
+        self.counted = False
+        self.message = 0
+        self.changed = 0
 
     def write(self, level: bool, message: int, now: int) -> bool:
         """Whether it changed."""
@@ -50,8 +52,10 @@ class Reference:
     def __init__(self) -> None:
         self.state = "run"
         self.number = 0
-        self.now = self.messages = 0
-        self.barrier = self.acknowledged = 0
+        self.now = 0
+        self.messages = 0
+        self.barrier = 0
+        self.acknowledged = 0
         self.signals = {
             name: Signal() for name in ("emergency_stop", "conf_mess", "drives_on", "drives_off")
         }

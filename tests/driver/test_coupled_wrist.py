@@ -24,12 +24,14 @@ def coupled(cell):
 
 def test_torques_are_those_of_the_motors(coupled):
     simulation = make_simulation(coupled, backend="pybullet")
-    backend, dynamics = simulation.backend, simulation.dynamics
+    backend = simulation.backend
+    dynamics = simulation.dynamics
     generator = np.random.default_rng(1)
     robot = coupled.robot
     for _ in range(20):
         q = generator.uniform(robot.position_min, robot.position_max)
-        qd, qdd = generator.uniform(0.1, 1.0, 6), generator.normal(0.0, 2.0, 6)
+        qd = generator.uniform(0.1, 1.0, 6)
+        qdd = generator.normal(0.0, 2.0, 6)
         backend.reset(q)
         expected = dynamics.inverse_dynamics(q[None], qd[None], qdd[None])[0]
         assert np.abs(backend.required_torque(q, qd, qdd) - expected).max() < 1e-6

@@ -97,7 +97,8 @@ def test_every_step_and_the_whole_cost_what_was_planned(drawn: Drawn) -> None:
     simulation.backend.reset(np.array(cell.park))
     simulation.executor.hold(np.array(cell.park))
     simulation.run(1.5)  # the controller has settled, the capacitor is empty
-    begin = before = simulation.mains.energy()
+    begin = simulation.mains.energy()
+    before = begin
     wrong = []
     for movement in plan.movements:
         if movement.load != simulation.load.text:

@@ -23,7 +23,8 @@ def test_an_hour_of_shift(make, plan, start, cell):
     driver = Driver(simulation, steps=10)
     home = np.array(cell.machine_home)
     work = home + np.array([1.0, 0.3, -0.3, 0.5, -0.4, 0.6])
-    total = last = 0.0
+    total = 0.0
+    last = 0.0
     at_work = False
     levels = set()
     settled = 0

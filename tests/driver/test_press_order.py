@@ -125,7 +125,8 @@ def delivered(bench: Bench, sent: list[PlcInputs], generator: random.Random) -> 
 def test_presses_ahead_of_their_turn_keep_the_law_of_stops(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    recovered = stopped = 0
+    recovered = 0
+    stopped = 0
     for seed in range(CASES):
         generator = random.Random(seed)
         bench = Bench(monkeypatch)

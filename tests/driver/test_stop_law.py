@@ -32,7 +32,8 @@ class Pair:
     def clone(self) -> Pair:
         new = object.__new__(Pair)
         new.core = self.core.clone()
-        new.reference = reference = object.__new__(Reference)
+        reference = object.__new__(Reference)
+        new.reference = reference
         reference.__dict__.update(self.reference.__dict__)
         reference.signals = {name: _same(each) for name, each in self.reference.signals.items()}
         return new

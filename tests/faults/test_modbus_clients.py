@@ -9,6 +9,7 @@ import socket
 import struct
 import threading
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
 from pymodbus.client import ModbusTcpClient
@@ -81,16 +82,13 @@ def connected(port: int) -> socket.socket:
 
 
 def test_a_hundred_silent_clients_leave_a_place_and_no_line_in_the_log(
-    open_port: Opened, driver: Driver, capfd: pytest.CaptureFixture[str]
+    open_port: Opened, driver: Driver, capfd: pytest.CaptureFixture[str], wait_for: Any
 ) -> None:
     port = open_port(modbus_connections=4)
     before = threading.active_count()
     silent = [connected(port) for _ in range(100)]
-    for _ in range(100):  # who was not silent for a second keeps its place
-        if is_served(port):
-            break
-        threading.Event().wait(0.1)
-    assert is_served(port)
+    # a client that was not silent for a second keeps its place
+    wait_for(lambda: is_served(port), what="a place for a client that asks")
     assert threading.active_count() <= before  # one of a test before may have ended
     ended = 0
     for link in silent:

@@ -87,7 +87,8 @@ def test_no_torque_or_power_is_above_its_bound(core: Any, case: str) -> None:
     most = np.zeros(model.n)
     net = []
     for segment, duration in zip(c, T, strict=True):
-        samples, p = [], segment
+        samples = []
+        p = segment
         t = np.broadcast_to((np.arange(400) + 0.5) / 400 * duration, (model.n, 400))
         for _ in range(3):
             samples.append(np.ascontiguousarray(evaluate(p, t).T))

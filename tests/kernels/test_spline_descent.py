@@ -238,7 +238,8 @@ def test_arrays_of_terms_may_change_afterwards(core: Any) -> None:
     t = terms(kr210(), len(collision.pairs), velocity=np.full(6, 0.5))
     cost = SplineCost(collision, dynamics, t, core=core)
     before = cost.value(swing(16), 0.1).value
-    t.velocity[:] = t.threshold[:] = 1e-3
+    t.velocity[:] = 1e-3
+    t.threshold[:] = 1e-3
     assert cost.value(swing(16), 0.1).value == before
 
 

@@ -259,6 +259,7 @@ class Simulated(Robot):
         self._plc.step(step)
         self._control.react_to_plc()
         self._control.step(step, motion=False, standing=True, emergency=False)
-        self.mode = self.goal = self._control.modes.mode
+        self.mode = self._control.modes.mode
+        self.goal = self.mode
         if asleep and self.online:
             self._plc.wake()

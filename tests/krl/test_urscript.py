@@ -46,7 +46,10 @@ def test_the_flange_is_the_makers(bench: Planner) -> None:
     q = np.array([0.3, -1.1, -0.7, 0.4, 0.9, -0.2])
     pose = np.eye(4)
     for joint, along, out, turn in zip(q, d, a, alpha, strict=True):
-        c, s, ca, sa = np.cos(joint), np.sin(joint), np.cos(turn), np.sin(turn)
+        c = np.cos(joint)
+        s = np.sin(joint)
+        ca = np.cos(turn)
+        sa = np.sin(turn)
         pose = pose @ np.array(
             [
                 [c, -s * ca, s * sa, out * c],

@@ -46,7 +46,8 @@ class Case(NamedTuple):
 
     def put_into(self, request: Any) -> Any:
         """A copy of the request with the value in its place."""
-        owner = request = deepcopy(request)
+        owner = deepcopy(request)
+        request = owner
         for name in request.get_fields_and_field_types():
             if (
                 name.endswith("_id") and name != self.path[0]

@@ -54,7 +54,8 @@ class Heard:
     """A driver that notes what the topic writes, and what it warns of."""
 
     def __init__(self) -> None:
-        self.plc, self.warn = self, lambda sentence: self.said.append(sentence)
+        self.plc = self
+        self.warn = lambda sentence: self.said.append(sentence)
         self.written: list[Any] = []
         self.pressed: list[Any] = []
         self.said: list[str] = []
@@ -114,7 +115,8 @@ def test_what_waits_for_a_busy_node_while_a_stop_is_latched_moves_nothing_after_
 ) -> None:
     """By action and topic; the executor takes neither before the recovery."""
     positions: list[Any] = []
-    busy, done = threading.Event(), threading.Event()
+    busy = threading.Event()
+    done = threading.Event()
     server = BackgroundExecutor(ros_context)
     parameters = {"cell": "open", "backend": "ideal", "wake_port": 0, "plc.startup_window": 0.0}
     overrides = [Parameter(name, value=value) for name, value in parameters.items()]

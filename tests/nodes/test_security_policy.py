@@ -56,7 +56,8 @@ def tool() -> Any:
     )
     assert spec is not None
     assert spec.loader is not None
-    module = sys.modules["security_policy"] = importlib.util.module_from_spec(spec)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["security_policy"] = module
     spec.loader.exec_module(module)
     return module
 

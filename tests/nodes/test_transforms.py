@@ -117,7 +117,8 @@ def test_markers_are_the_capsules_wherever_the_robot_stands(driver):
         for capsule, cylinder, balls in zip(robot + load, drawn[::2], drawn[1::2], strict=True):
             T = poses[capsule.link]
             ends = np.array([T[:3, :3] @ p + T[:3, 3] for p in (capsule.p0, capsule.p1)])
-            place, turn = cylinder.pose.position, cylinder.pose.orientation
+            place = cylinder.pose.position
+            turn = cylinder.pose.orientation
             axis = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).apply([0.0, 0.0, 1.0])
             centre = np.array([place.x, place.y, place.z])
             half = 0.5 * cylinder.scale.z * axis

@@ -77,7 +77,8 @@ class Line:
 
 def lines(page: Path) -> Iterator[Line]:
     """The lines in code that call `ir`."""
-    fenced = shell = False
+    fenced = False
+    shell = False
     rest = iter(page.read_text("utf-8").splitlines())
     for line in rest:
         if line.startswith("```"):

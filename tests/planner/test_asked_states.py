@@ -44,7 +44,8 @@ def test_a_batch_says_what_each_state_says(planner: Planner, station: str, load:
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e308, -1e308, 7.0])
 def test_the_first_bad_state_is_named_by_its_index(planner: Planner, value: float) -> None:
     q = np.tile(np.array(planner.cell.machine_home), (5, 1))
-    q[2, 3] = q[4, 0] = value
+    q[2, 3] = value
+    q[4, 0] = value
     with pytest.raises(RequestError, match=r"states\[2\]: joint_a4 is ") as refused:
         planner.check_states(q, safety_distance=0.02)
     assert "inf deg" not in str(refused.value)

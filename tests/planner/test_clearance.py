@@ -39,7 +39,8 @@ def coal_distance(scene: PlanningScene, q: FloatArray) -> float:
     request.gjk_tolerance = 1e-9
     smallest = np.inf
     for pair in scene.collision.pairs:
-        (a, pose_a), (b, pose_b) = bodies[pair.body_a], bodies[pair.body_b]
+        a, pose_a = bodies[pair.body_a]
+        b, pose_b = bodies[pair.body_b]
         first, second = (
             coal.Transform3s(np.ascontiguousarray(p[:3, :3]), np.ascontiguousarray(p[:3, 3]))
             for p in (pose_a, pose_b)

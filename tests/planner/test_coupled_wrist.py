@@ -29,7 +29,9 @@ CELLS = ("kr6_bench", "open")
 def planner(name: str) -> Planner:
     cell = load_cell(name)
     turns = np.eye(6)
-    turns[4, 3], turns[5, 3], turns[5, 4] = -0.3, 0.2, 1.0
+    turns[4, 3] = -0.3
+    turns[5, 3] = 0.2
+    turns[5, 4] = 1.0
     robot = replace(cell.robot, motor_turns=turns)
     return Planner(replace(cell, robot=robot), clock=itertools.repeat(0.0).__next__)
 

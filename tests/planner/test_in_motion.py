@@ -127,7 +127,8 @@ def test_stopping_first_takes_no_less_time(planner: Planner, seed: int) -> None:
 
 def test_both_ends_have_the_motion_that_was_asked_for(planner: Planner) -> None:
     before, _, _ = driven(planner, 11)
-    at, until = 0.25 * before.duration, 0.7 * before.duration
+    at = 0.25 * before.duration
+    until = 0.7 * before.duration
     state = before.sample([at, until])
     plan = planner.plan_regional(
         start=state.q[0],
@@ -201,8 +202,10 @@ def test_a_braking_joint_goes_on_as_far_as_was_said() -> None:
     draw = np.random.default_rng(0)
     step = 1e-5
     for _ in range(60):
-        most, jerk = draw.uniform(1.0, 8.0), draw.uniform(20.0, 400.0)
-        v, a = draw.uniform(-2.0, 3.0), draw.uniform(-1.0, 1.0) * most
+        most = draw.uniform(1.0, 8.0)
+        jerk = draw.uniform(20.0, 400.0)
+        v = draw.uniform(-2.0, 3.0)
+        a = draw.uniform(-1.0, 1.0) * most
         times = np.arange(0.0, 6.0, step)
         braking = np.maximum(a - jerk * times, -most)
         speed = v + np.cumsum(braking) * step

@@ -10,12 +10,12 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing import Pipe
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -63,13 +63,6 @@ def in_time(act: Callable[[], Found]) -> Found | Exception:
     thread.join(PATIENCE)
     assert outcome, "the request has no end"
     return outcome[0]
-
-
-def until(true: Callable[[], bool]) -> bool:
-    end = time.monotonic() + PATIENCE
-    while not true() and time.monotonic() < end:
-        time.sleep(0.02)
-    return true()
 
 
 def gone(process: int) -> bool:
@@ -164,7 +157,7 @@ def test_a_host_that_answers_nobody_is_replaced(
 
 @pytest.mark.usefixtures("loaded_host")
 def test_a_process_that_is_stopped_before_it_reads_a_long_problem(
-    scene_of: SceneOf, charged: Callable[[Callable[[int], None]], None]
+    scene_of: SceneOf, charged: Callable[[Callable[[int], None]], None], wait_for: Any
 ) -> None:
     """More than a socket holds: a cell with many meshes."""
     seen: list[int] = []
@@ -179,7 +172,7 @@ def test_a_process_that_is_stopped_before_it_reads_a_long_problem(
     found = in_time(lambda: SEARCHES["rrt"].find(ends, long, 1, space.work))
     assert isinstance(found, Found)
     assert found.paths == []
-    assert until(lambda: gone(seen[0]))
+    wait_for(lambda: gone(seen[0]), what="the end of the process")
 
 
 @pytest.mark.parametrize("name", ["kpiece", "prm"])
@@ -195,7 +188,7 @@ def test_a_process_that_is_killed_is_an_answer_without_a_path(
 
 
 def test_many_requests_leave_no_process_and_no_descriptor(
-    scene_of: SceneOf, charged: Callable[[Callable[[int], None]], None]
+    scene_of: SceneOf, charged: Callable[[Callable[[int], None]], None], wait_for: Any
 ) -> None:
     seen: list[int] = []
     charged(seen.append)
@@ -209,7 +202,7 @@ def test_many_requests_leave_no_process_and_no_descriptor(
     open_at_first = ask(0)
     assert [ask(seed) - open_at_first for seed in range(1, 20)] == [Counter()] * 19
     assert len(set(seen)) == 20
-    assert until(lambda: all(gone(process) for process in seen))
+    wait_for(lambda: all(gone(process) for process in seen), what="the end of the processes")
 
 
 @pytest.mark.skipif(bool(host.missing()), reason=host.missing())
@@ -295,7 +288,7 @@ SEARCHES[sys.argv[1]].find(Ends(np.array(task.start), beyond), space, 1, space.w
 
 
 @pytest.mark.parametrize("stopped", [False, True])
-def test_what_a_planner_that_is_killed_leaves_ends(stopped: bool) -> None:
+def test_what_a_planner_that_is_killed_leaves_ends(stopped: bool, wait_for: Any) -> None:
     asking = subprocess.Popen(
         [sys.executable, "-c", ASKING, "rrt"], stdout=subprocess.PIPE, text=True
     )
@@ -307,8 +300,7 @@ def test_what_a_planner_that_is_killed_leaves_ends(stopped: bool) -> None:
     asking.kill()
     asking.wait()
     asking.stdout.close()
-    assert until(lambda: gone(loaded))
-    assert until(lambda: gone(process))
+    wait_for(lambda: gone(loaded) and gone(process), what="the end of both processes")
 
 
 def test_two_threads_get_the_paths_that_each_gets_alone(scene_of: SceneOf) -> None:

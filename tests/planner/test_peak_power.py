@@ -36,7 +36,8 @@ def generated(scene: PlanningScene, seed: int) -> JointTrajectory:
     q = np.array(scene.cell.park) + rng.uniform(-0.5, 0.5, (count, robot.n))
     q = np.clip(q, robot.position_min + 0.1, robot.position_max - 0.1)
     qd, qdd = rng.uniform(-0.5, 0.5, (2, count, robot.n))
-    qd[[0, -1]] = qdd[[0, -1]] = 0.0
+    qd[[0, -1]] = 0.0
+    qdd[[0, -1]] = 0.0
     if rng.random() < 0.3:  # a joint that rests
         still = int(rng.integers(robot.n))
         q[:, still] = q[0, still]

@@ -39,7 +39,8 @@ def simulated(
     if not orders or orders[0][0] > rests.timer:
         closed = [(rests.timer, 1), *[(at, k) for at, k in orders if k != 1]]
         orders = closed if wake > rests.timer else []
-    now = energy = 0.0
+    now = 0.0
+    energy = 0.0
     mode = 0
     for at, k in orders:
         start = max(at, now)

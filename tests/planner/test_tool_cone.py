@@ -68,8 +68,10 @@ def upright_poses(planner: Planner, count: int, seed: int) -> list[FloatArray]:
     found: list[FloatArray] = []
     while len(found) < count:
         around, yaw = rng.uniform(-np.pi, np.pi, 2)
-        radius, height = rng.uniform(0.35, 0.6) * reach, rng.uniform(0.15, 0.5) * reach
-        c, s = np.cos(yaw), np.sin(yaw)
+        radius = rng.uniform(0.35, 0.6) * reach
+        height = rng.uniform(0.15, 0.5) * reach
+        c = np.cos(yaw)
+        s = np.sin(yaw)
         pose = np.eye(4)
         pose[:3, :3] = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ down
         pose[:3, 3] = base + np.array([radius * np.cos(around), radius * np.sin(around), height])

@@ -64,7 +64,8 @@ def test_from_a_start_near_a_limit_the_axis_turns_back_or_the_tool_does(planner:
         path = CartesianPath(
             begin, (CartesianSegment("line", (end,)),), tool_speed=0.05, free_angle=free_angle
         )
-        plans[turn, free_angle] = plan = planner.plan_cartesian(path, options=OPTIONS, start=start)
+        plan = planner.plan_cartesian(path, options=OPTIONS, start=start)
+        plans[turn, free_angle] = plan
         not_worse(plan, with_all(path, start=start))
     beyond = next(turn for turn in (-20.0, 20.0) if not plans[turn, 0.0].status.ok)
     assert plans[-beyond, 0.0].status.ok

@@ -432,7 +432,8 @@ def _tool() -> ModuleType:
     spec = importlib.util.spec_from_file_location("_chromium", CHROMIUM)
     assert spec is not None
     assert spec.loader is not None
-    module = sys.modules["_chromium"] = importlib.util.module_from_spec(spec)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["_chromium"] = module
     spec.loader.exec_module(module)
     return module
 

@@ -84,7 +84,8 @@ def drawn_saving(rng: np.random.Generator) -> Saving:
 
 
 def drawn_savings(rng: np.random.Generator) -> ProgramSavings:
-    movements, pauses = drawn_saving(rng), drawn_saving(rng)
+    movements = drawn_saving(rng)
+    pauses = drawn_saving(rng)
     low, high = (
         getattr(movements, end) + getattr(pauses, end) for end in ("saved_low", "saved_high")
     )

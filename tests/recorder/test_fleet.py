@@ -64,7 +64,8 @@ def test_the_sums_are_those_of_the_members(member: Member) -> None:
 def test_shifts_of_one_robot_are_averaged(member: Member) -> None:
     """Law: the same shift twice changes nothing."""
     costs = Costs()
-    (once,), (twice,) = robots_of([member], costs), robots_of([member, member], costs)
+    (once,) = robots_of([member], costs)
+    (twice,) = robots_of([member, member], costs)
     assert twice == replace(once, recordings=2)
     assert by_mode([member, member], costs) == by_mode([member], costs)
     assert by_movement([member, member], costs) == by_movement([member], costs)

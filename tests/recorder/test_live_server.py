@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import socket
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import suppress
 from http.client import HTTPConnection, HTTPResponse
@@ -213,34 +212,35 @@ def test_browsers_that_never_read_hold_up_nobody_and_too_many_are_refused(cell: 
     assert next(reader)[1][-1]["load"] == "after"
 
 
-def test_connections_that_drip_keep_no_button_out(cell: Cell) -> None:
+def test_connections_that_drip_keep_no_button_out(cell: Cell, wait_for: Any) -> None:
     """A byte now and then is no request: who takes too long is hung up on, however it does it."""
     dripping = [
         socket.create_connection(("127.0.0.1", cell.server.port), timeout=PATIENCE)
         for _ in range(2 * MOST_ASKING)
     ]
-    ended = 0.0
-    begun = time.monotonic()
-    while not ended and time.monotonic() - begun < PATIENCE:
+
+    def all_are_hung_up_on() -> bool:
         assert json.loads(cell.post().read())["done"]
         for connection in dripping:
             with suppress(OSError):
                 connection.send(b"G")
-        ended = time.monotonic() if not cell.server.connections else 0.0
-        time.sleep(0.1)
-    assert ended
+        return not cell.server.connections
+
+    wait_for(all_are_hung_up_on, timeout=PATIENCE, what="the end of the slow connections")
     for connection in dripping:
         connection.close()
 
 
-def test_a_stop_finds_a_place_among_waiting_requests_and_is_taken_first() -> None:
+def test_a_stop_finds_a_place_among_waiting_requests_and_is_taken_first(wait_for: Any) -> None:
     commands = Commands()
     asked = [("ab", True)] * MOST_WAITING + [("emergency_stop", True)]
     waiting = [threading.Thread(target=commands.press, args=each) for each in asked]
     for thread in waiting:
         thread.start()
-    while commands._queue.qsize() + commands._stops.qsize() < len(asked):
-        time.sleep(0.001)
+    wait_for(
+        lambda: commands._queue.qsize() + commands._stops.qsize() == len(asked),
+        what="all requests wait",
+    )
     taken = list(commands.take())
     for command in taken:
         command.answer(True, "set")

@@ -32,7 +32,8 @@ def _reader() -> ModuleType:
     spec = importlib.util.spec_from_file_location("page_figures", path)
     assert spec is not None
     assert spec.loader is not None
-    module = sys.modules["page_figures"] = importlib.util.module_from_spec(spec)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["page_figures"] = module
     spec.loader.exec_module(module)
     return module
 

@@ -243,7 +243,8 @@ def test_of_a_pair_of_writers_one_is_refused_and_nothing_is_lost(
     """Both begin at once, of one file with and without an older one: one writes and the other is
     refused, and what SUCCESS counted is in the file.
     """
-    written = refused = 0
+    written = 0
+    refused = 0
     schemas = SchemaLibrary()
     for pair in range(pairs):
         path = tmp_path / f"{pair}.mcap"

@@ -101,7 +101,8 @@ def test_a_run_that_died_is_listed_with_its_question() -> None:
     entry = Entry("b", "open", "1", 0, "", "synchronous")
     free = replace(RUNS[0], row={**RUNS[0].row, "free_ptp": True})
     lost = Run(entry, {"solved": False, "outcome": "died"})
-    blocked, free_ones = blocked_and_free(runs := asked_alike([free, lost, *RUNS[1::2]]))
+    runs = asked_alike([free, lost, *RUNS[1::2]])
+    blocked, free_ones = blocked_and_free(runs)
     assert (blocked, [one.entry for one in free_ones]) == ([RUNS[1], RUNS[3]], [free.entry, entry])
     assert columns(runs)["free_ptp"] == [1, 1, 0, 0]
 

@@ -33,7 +33,8 @@ def drawn() -> list[Pair]:
 
 def counterbalance(pair: Pair, a2: FloatArray) -> FloatArray:
     data: Any = pair.scene.cell.robot.counterbalance
-    (x, z), pivot = data.rod_eye, np.asarray(data.pivot)
+    x, z = data.rod_eye
+    pivot = np.asarray(data.pivot)
     eye = np.stack([x * np.cos(a2) + z * np.sin(a2), z * np.cos(a2) - x * np.sin(a2)], axis=1)
     length = np.linalg.norm(pivot - eye, axis=1)
     gas = data.gas_volume / (
@@ -81,7 +82,8 @@ def joules(pair: Pair, trajectory: JointTrajectory, slower: float = 1.0) -> floa
     torque = torques(pair, motion.q, qd, qdd)
     power = torque * qd + robot.copper_loss * (torque / robot.gear_ratio) ** 2
     most = 0.5 * link.capacitance * (link.chopper_on**2 - link.voltage**2)
-    stored = mains = 0.0
+    stored = 0.0
+    mains = 0.0
     for taken in power.sum(axis=1) * dt * slower:
         stored -= taken
         mains -= min(stored, 0.0)

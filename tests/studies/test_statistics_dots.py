@@ -28,7 +28,8 @@ def test_an_interval_that_is_wider_than_its_dots_is_drawn_to_its_ends(
         (float(value), float(x))
         for x, value in re.findall(r'<text x="([\d.]+)"[^>]*>([+-]?[\d.e-]+) %</text>', drawn)
     ]
-    (low, left), (high, right) = ticks[0], ticks[-1]
+    low, left = ticks[0]
+    high, right = ticks[-1]
     assert low <= min(ends)
     assert high >= max(ends)
     assert low < 0.0 < high

@@ -84,7 +84,8 @@ def test_two_cells_in_one_domain_keep_to_themselves(
     try:
         for cell in CELLS:
             processes.append(up(cell))
-            client = clients[cell] = Client(cell, domain_id=ros_domain_id, timeout=START_SECONDS)
+            client = Client(cell, domain_id=ros_domain_id, timeout=START_SECONDS)
+            clients[cell] = client
             nodes = {f"/{cell}/{node}" for node in NODES}
             wait_for(
                 lambda nodes=nodes, client=client: (

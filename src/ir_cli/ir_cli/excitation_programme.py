@@ -266,7 +266,8 @@ class Design:
             watts += sum(load.watts_drive_bus for load in loads)
         still[self._prior.index("tool_watts")] = watts
         if mode == "STAND_ON_MOTORS":
-            still[self._prior.index("drives_watts")] = still[self._prior.index(IDLE)] = 1.0
+            still[self._prior.index("drives_watts")] = 1.0
+            still[self._prior.index(IDLE)] = 1.0
         scaled = still * self._scale
         self._information = (
             self._information + np.outer(scaled, scaled) * seconds / WINDOW / self._noise**2

@@ -88,7 +88,8 @@ def smoothed(
     q, qd, qdd = (np.asarray(spline(knots, nu=k)) for k in range(3))
     for end in (0, -1):
         if np.abs(qd[end]).max() < _AT_REST:
-            qd[end] = qdd[end] = 0.0
+            qd[end] = 0.0
+            qdd[end] = 0.0
     return JointTrajectory.from_seconds(names, knots, q, qd, qdd)
 
 

@@ -170,7 +170,8 @@ def cut(motion: JointTrajectory, begin: float, end: float) -> JointTrajectory:
     found = motion.sample(times)
     qd = found.qd.copy()
     qdd = found.qdd.copy()
-    qd[[0, -1]] = qdd[[0, -1]] = 0.0
+    qd[[0, -1]] = 0.0
+    qdd[[0, -1]] = 0.0
     return JointTrajectory.from_seconds(motion.joint_names, times - begin, found.q, qd, qdd)
 
 

@@ -56,7 +56,9 @@ def _cos_sin(angle_deg: float) -> tuple[float, float]:
 def rotation_from_abc(abc_deg: ArrayLike) -> FloatArray:
     """Return the rotation (3, 3) of KUKA's A, B, C [deg]."""
     a, b, c = frozen(abc_deg, (3,), "abc_deg")
-    (ca, sa), (cb, sb), (cc, sc) = _cos_sin(a), _cos_sin(b), _cos_sin(c)
+    ca, sa = _cos_sin(a)
+    cb, sb = _cos_sin(b)
+    cc, sc = _cos_sin(c)
     return np.array(
         [
             [ca * cb, ca * sb * sc - sa * cc, ca * sb * cc + sa * sc],

@@ -49,7 +49,8 @@ class BidirectionalTree:
         start_line: ArrayLike | None = None,
         goal_lines: Sequence[ArrayLike] | None = None,
     ) -> None:
-        n = self._n = collision.chain.n
+        n = collision.chain.n
+        self._n = n
         least = checked("low", low, n)
         most = checked("high", high, n)
         if (least > most).any():

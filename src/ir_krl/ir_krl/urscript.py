@@ -217,7 +217,8 @@ class _Script:
             case ast.UnaryOp(op=ast.USub(), operand=inner):
                 return -self._number(inner, place)
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
-                a, b = self._number(left, place), self._number(right, place)
+                a = self._number(left, place)
+                b = self._number(right, place)
                 if isinstance(op, ast.Div) and b == 0.0:
                     raise KrlRunError("division by 0", place)
                 return _OPERATORS[type(op)](a, b)

@@ -84,13 +84,16 @@ class Stage:
         self.near: Nearest | None = None
         self.found: tuple[StationAccess, ...] = ()
         self.errors: tuple[str, ...] = ()
-        self.failure = self.note = ""
+        self.failure = ""
+        self.note = ""
 
     def move(self, cell: Cell) -> None:
         """Another version of the same cell: machines and stations stand elsewhere."""
-        self.cell = self.now = cell
+        self.cell = cell
+        self.now = cell
         self.found = ()
-        self.failure = self.note = ""
+        self.failure = ""
+        self.note = ""
 
     def hold(self, load: str, places: PartPlaces, cell: Cell | None = None) -> None:
         """What the robot holds, where the parts lie, and the cell with its machines in other
@@ -157,13 +160,15 @@ class Session:
         self._inbox = Inbox()
         self._stream = Stream()
         self._scene = b""
-        self._number = self._scenes = 0
+        self._number = 0
+        self._scenes = 0
         self._motion: PlayedMotion | None = None
         self._moves: dict[Target, FloatArray] = {}
         self._file: Cell | None = None
         self._drawn: Cell | None = None  # as the scene has it
         self._stage: Stage | None = None
-        self._looked = self._beat = time.monotonic()
+        self._looked = time.monotonic()
+        self._beat = self._looked
         self._controls = {
             "joints": Control(self._joints, (list,)),
             "at": Control(self._at, (str,)),
@@ -250,7 +255,8 @@ class Session:
         q = np.array(cell.machine_home) if other or before is None else before.q
         self._file = cell
         self._moves = {}
-        self._stage = stage = Stage(cell, q)
+        stage = Stage(cell, q)
+        self._stage = stage
         stage.note = note
         stage.stand(q)
         self._say(name=one_line(cell.name, MOST_WORDS), compared="", stations=[], tiles=[])

@@ -106,7 +106,9 @@ class BodyReader:
     def __init__(self, shapes: NameRegister, folder: Path | None) -> None:
         self._shapes = shapes
         self._folder = folder
-        self._count = self._corners = self._triangles = 0
+        self._count = 0
+        self._corners = 0
+        self._triangles = 0
         self._meshes: dict[tuple[str, bool], FloatArray] = {}
         self._solids = SolidReader(folder)
         self._clouds = CloudReader(folder)

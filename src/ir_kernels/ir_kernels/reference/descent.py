@@ -183,7 +183,8 @@ class ProfileCost:
 
     def value(self, x: FloatArray) -> tuple[float, FloatArray]:
         """Cost and its gradient (C + 1,)."""
-        (s, duration), ends = self.at(x), self.ends
+        s, duration = self.at(x)
+        ends = self.ends
         q, slope = along(*self.path, s)
         right = 6.0 * q
         right[0] -= ends[0]

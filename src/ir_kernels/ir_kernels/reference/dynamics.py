@@ -109,7 +109,8 @@ def counterbalance_torque(
     """Torque about the joint's +axis (positive lowers the arm), for any kind of number with its
     sqrt and power.
     """
-    (bx, bz), (ex, ez) = data.pivot, data.rod_eye
+    bx, bz = data.pivot
+    ex, ez = data.rod_eye
     px = cos * ex + sin * ez
     pz = cos * ez - sin * ex
     length = sqrt(

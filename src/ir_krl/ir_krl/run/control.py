@@ -143,7 +143,8 @@ class Control:
         """Whether a jump back is followed: not for ever, where nothing that is known ends it."""
         turn = turns.get(jump.label)
         if turn is None:
-            turn = turns[jump.label] = _Turn(0, self.memory.watch(), self._guessed_exits)
+            turn = _Turn(0, self.memory.watch(), self._guessed_exits)
+            turns[jump.label] = turn
         turn.count += 1
         still = turn.count > 1 and not self.memory.changed(turn.watched)
         bound = not any(_ways_out(one) for one in between[:-1])
@@ -435,7 +436,8 @@ class Control:
                 sides = [self._blocked(one, wanted=wanted) for one in tree.children[::2]]
                 every = (str(tree.children[1]) == "AND") is wanted
                 return any(sides) if every else all(sides)
-            case "compared" if (same := _same_as(tree)) is not None:
+            case "compared" if _is_truth_comparison(tree):
+                same = _holds_with_left(tree)
                 return self._blocked(tree.children[0], wanted=wanted is same)
         if not self._is_own(tree):
             return False
@@ -462,7 +464,8 @@ class Control:
             case "joined" if str(tree.children[1]) == ("AND" if wanted else "OR"):
                 self._settle(tree.children[0], wanted=wanted)
                 self._settle(tree.children[2], wanted=wanted)
-            case "compared" if (same := _same_as(tree)) is not None:
+            case "compared" if _is_truth_comparison(tree):
+                same = _holds_with_left(tree)
                 self._settle(tree.children[0], wanted=wanted is same)
             case "access" if self._is_own(tree):
                 self.memory.set(self.expressions.path(tree), wanted, self.place(tree))
@@ -558,11 +561,14 @@ class Control:
             self._check_names(child)
 
 
-def _same_as(compared: Tree) -> bool | None:
-    """Of a comparison with TRUE or FALSE: whether it holds where its left side does; else None."""
+def _is_truth_comparison(compared: Tree) -> bool:
+    """Whether a comparison is one with TRUE or FALSE."""
+    return compared.children[2].data in ("true", "false")
+
+
+def _holds_with_left(compared: Tree) -> bool:
+    """Of a comparison with TRUE or FALSE: whether it holds where its left side does."""
     _, sign, right = compared.children
-    if right.data not in ("true", "false"):
-        return None
     return (str(sign) == "==") is (right.data == "true")
 
 

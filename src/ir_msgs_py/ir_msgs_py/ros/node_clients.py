@@ -119,7 +119,8 @@ class DriverClient:
         self._response_timeout = response_timeout
         self._silence_timeout = silence_timeout
         self._cancel_timeout = cancel_timeout
-        self._heard = self._looked = -float("inf")
+        self._heard = -float("inf")
+        self._looked = -float("inf")
         self._time = PlantTime(lambda: node_time(node))
         self._plc = node.create_client(SetPlcInputSrv, f"{name}/set_plc_input", qos_profile=SERVICE)
         self._load = node.create_client(SetLoadSrv, f"{name}/set_load", qos_profile=SERVICE)

@@ -176,7 +176,8 @@ class _Asking:
         """The side of a plan, or why there is none."""
         if not plan.status.ok:
             return Side(name, cycle_time, problem=plan.status.message)
-        self._found[name] = program = self.costed(plan.movements)
+        program = self.costed(plan.movements)
+        self._found[name] = program
         return side_of(name, cycle_time, program, self.request, saving(against, program))
 
     def answer(

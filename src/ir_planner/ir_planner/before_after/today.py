@@ -186,9 +186,11 @@ def _path(run: Sequence[DrivenStep], names: set[str]) -> CellPath:
     first = run[0].places[0].line
     last = run[-1].places[-1].line
     base = f"lines_{first}_to_{last}" if first != last else f"line_{first}"
-    name = next(
-        n for k in range(1, 10_000) if (n := base if k == 1 else f"{base}_{k}") not in names
-    )
+    name = base
+    number = 1
+    while name in names:
+        number += 1
+        name = f"{base}_{number}"
     names.add(name)
     try:
         path = CartesianPath(

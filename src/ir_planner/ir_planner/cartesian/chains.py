@@ -464,7 +464,8 @@ def _different(
     digits = np.round(portable.log(np.maximum(cost[last], 1e-12)) / _SAME)
     order = last[np.lexsort((away, digits))]
     firsts = np.sort(np.unique(family[order], return_index=True)[1])
-    (apart, most), kept = bounds, list[int]()
+    apart, most = bounds
+    kept = list[int]()
     for node in [*order[firsts], *np.delete(order, firsts)]:
         if len(kept) == most:
             break

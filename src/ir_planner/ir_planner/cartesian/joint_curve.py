@@ -85,8 +85,10 @@ class JointCurve:
         begins, coefficients = self._pieces
         k = np.clip(np.searchsorted(begins, s, side="right") - 1, 0, len(begins) - 1)
         h = (s - begins[k])[:, None]
-        highest, *others = coefficients[:, k]
-        q, first, second, third = highest, *(np.zeros_like(highest) for _ in range(3))
+        q, *others = coefficients[:, k]
+        first = np.zeros_like(q)
+        second = np.zeros_like(q)
+        third = np.zeros_like(q)
         for coefficient in others:  # Horner's rule, for the derivatives as well
             third = third * h + second
             second = second * h + first
@@ -347,7 +349,8 @@ def _step(problem: _Problem, control: FloatArray, chain: Chain) -> FloatArray:
     low = np.maximum(-problem.bound - control, -_FARTHEST)
     high = np.minimum(problem.bound - control, _FARTHEST)
     if problem.fixed:
-        low[0] = high[0] = 0.0
+        low[0] = 0.0
+        high[0] = 0.0
     normal = portable.matmul(slopes.T, slopes)
     right = portable.matmul(-slopes.T, residual)
     normal += 1e-9 * np.trace(normal) / len(normal) * np.eye(len(normal))

@@ -371,7 +371,8 @@ def about_tool(angle: FloatArray) -> FloatArray:
     s = portable.sin(angle)
     turned = np.zeros((len(angle), 3, 3))
     turned[:, 0, 0] = 1.0
-    turned[:, 1, 1] = turned[:, 2, 2] = c
+    turned[:, 1, 1] = c
+    turned[:, 2, 2] = c
     turned[:, 1, 2] = -s
     turned[:, 2, 1] = s
     return turned

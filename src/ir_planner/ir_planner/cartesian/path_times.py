@@ -342,7 +342,8 @@ def sent(strokes: tuple[TimedStroke, ...], limits: MotionLimits, scene: Planning
         motion = stroke.at(tau)
         qd = motion.qd.copy()
         qdd = motion.qdd.copy()
-        qd[[0, -1]] = qdd[[0, -1]] = 0.0
+        qd[[0, -1]] = 0.0
+        qdd[[0, -1]] = 0.0
         first = 1 if times else 0
         begins.append(begin_ns / NS_PER_S)
         instants.append(tau)

@@ -67,7 +67,8 @@ def position_violation(
     low = largest.lowest
     high = largest.highest
     if len(low) == 0:
-        low = high = trajectory.positions
+        low = trajectory.positions
+        high = low
     excess = np.maximum(low * -1.0 + robot.position_min, high - robot.position_max)
     beyond = np.argwhere(excess > POSITION_SLACK)
     if len(beyond) == 0:

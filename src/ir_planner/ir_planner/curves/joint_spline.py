@@ -63,7 +63,8 @@ def spline_through(
     if np.any(np.diff(knots) <= 0.0) or np.any(np.diff(point_times) <= 0.0):
         raise ValueError("times of a spline must increase")
     rest = (np.zeros(points.shape[1]), np.zeros(points.shape[1]))
-    (v0, a0), (vf, af) = start or rest, end or rest
+    v0, a0 = start or rest
+    vf, af = end or rest
     full = np.concatenate([np.repeat(knots[0], 4), knots[1:-1], np.repeat(knots[-1], 4)])
     ends = ((v0, a0), (vf, af))
     spline = portable.interpolating_spline(point_times, points, knots=full, ends=ends)

@@ -142,7 +142,8 @@ class LinearProgram:
         low = np.array(self.low)
         high = np.array(self.high)
         for index, value in fixed.items():
-            low[index] = high[index] = value
+            low[index] = value
+            high[index] = value
         solver.changeColsBounds(len(low), np.arange(len(low), dtype=np.int32), low, high)
 
     def _add_rows(self, solver: highspy.Highs) -> None:

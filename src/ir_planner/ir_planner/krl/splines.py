@@ -207,7 +207,8 @@ def timed_block(
     fine = np.concatenate([np.linspace(a, b, count + 1) for a, b, count in inner])
     steps = np.unique(np.rint(fine / GRID_S)).astype(np.int64)
     q, qd, qdd = (np.asarray(spline(steps * GRID_S, nu=k)) for k in range(3))
-    qd[[0, -1]] = qdd[[0, -1]] = 0.0
+    qd[[0, -1]] = 0.0
+    qdd[[0, -1]] = 0.0
     q[0] = points[0]
     q[-1] = points[-1]
     driven = JointTrajectory(arm.scene.cell.robot.joint_names, steps * GRID_NS, q, qd, qdd)

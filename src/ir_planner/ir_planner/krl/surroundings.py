@@ -284,7 +284,8 @@ def principal_axes(inertia: FloatArray) -> tuple[FloatArray, FloatArray]:
         t = float(np.copysign(1.0, theta) / (abs(theta) + np.sqrt(theta * theta + 1.0)))
         c = 1.0 / np.sqrt(t * t + 1.0)
         turn = np.eye(3)
-        turn[i, i] = turn[j, j] = c
+        turn[i, i] = c
+        turn[j, j] = c
         turn[i, j] = c * t
         turn[j, i] = -c * t
         a = portable.matmul(turn.T, a, turn)

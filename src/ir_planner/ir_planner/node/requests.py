@@ -206,7 +206,9 @@ class Requests:
             stands = "start" if velocity is None and acceleration is None else ""
             start = self._state(request.start, StatusCode.START_STATE_INVALID, at_rest=stands)
         else:
-            start, velocity, acceleration = driven.q[0], driven.qd[0], driven.qdd[0]
+            start = driven.q[0]
+            velocity = driven.qd[0]
+            acceleration = driven.qdd[0]
         goal_velocity, goal_acceleration = goal_motion_of(request, cell)
         plan = self.planner.plan_regional(
             start=start,

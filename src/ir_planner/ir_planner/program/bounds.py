@@ -110,7 +110,8 @@ class CoarseCost:
         robot = scene.cell.robot
         nobody = np.full((1, len(scene.collision.pairs)), -np.inf)
         ends = np.zeros((2, robot.n))
-        self.weights = weights = objective_weights(context, ends)
+        weights = objective_weights(context, ends)
+        self.weights = weights
         terms = SplineTerms(
             limits.velocity,
             limits.acceleration,

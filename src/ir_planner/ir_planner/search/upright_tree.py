@@ -192,7 +192,9 @@ class _Search:
             going[rows] = space.edges_free(here[active[rows]], following[rows])
             for k in np.flatnonzero(going):
                 lane = int(active[k])
-                at[lane] = last[lane] = tree.add(following[k], at[lane])
+                added = tree.add(following[k], at[lane])
+                at[lane] = added
+                last[lane] = added
                 here[lane] = following[k]
                 met[lane] = bool(final[k])
             active = active[going & ~final]

@@ -74,7 +74,10 @@ def blended(path: TimedPath, joint_names: tuple[str, ...]) -> JointTrajectory:
         qdd += sdd * delta
     q[0] = path.waypoints[0]
     q[-1] = path.waypoints[-1]
-    qd[0] = qd[-1] = qdd[0] = qdd[-1] = 0.0
+    qd[0] = 0.0
+    qd[-1] = 0.0
+    qdd[0] = 0.0
+    qdd[-1] = 0.0
     return JointTrajectory(joint_names, knots * GRID_NS, q, qd, qdd)
 
 

@@ -120,11 +120,14 @@ def law_states(steps: IntArray) -> LawStates:
     s, sd, sdd = np.zeros((3, len(steps), 8))
     peak = jerk[:, 0] * t[:, 0]
     brake = jerk[:, 4] * t[:, 4]
-    sdd[:, 1] = sdd[:, 2] = peak
-    sdd[:, 5] = sdd[:, 6] = brake
+    sdd[:, 1] = peak
+    sdd[:, 2] = peak
+    sdd[:, 5] = brake
+    sdd[:, 6] = brake
     sd[:, 1] = 0.5 * peak * t[:, 0]
     sd[:, 2] = sd[:, 1] + peak * t[:, 1]
-    sd[:, 3] = sd[:, 4] = speed
+    sd[:, 3] = speed
+    sd[:, 4] = speed
     sd[:, 6] = -0.5 * brake * t[:, 6]
     sd[:, 5] = sd[:, 6] - brake * t[:, 5]
     s[:, 7] = 1.0
@@ -358,7 +361,8 @@ def _ramp_level_law(speed: FloatArray, levels: FloatArray, jerk: float) -> IntAr
     change = np.abs(np.diff(around, axis=1)) / jerk
     gained = 0.5 * change * (around[:, :-1] + around[:, 1:])
     share = np.full(gained.shape, 0.5)
-    share[:, 0] = share[:, -1] = 1.0
+    share[:, 0] = 1.0
+    share[:, -1] = 1.0
     bands = np.diff(np.concatenate([[0.0], BANDS])) * speed[:, None]
     by_change = gained[:, :-1] * share[:, :-1] + gained[:, 1:] * share[:, 1:]
     hold = np.maximum(bands - by_change, 0.0) / levels

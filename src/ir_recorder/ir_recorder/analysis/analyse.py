@@ -168,7 +168,8 @@ def _full_pause(
     predicted = full - planned
     if deepest(sequence) != sequence and longer >= 0.0:
         # one mode after the other: the last one lasts longer
-        energy = predicted = longer * watts(mode, result)
+        energy = longer * watts(mode, result)
+        predicted = energy
     return FullPause(place, mode, longer, energy, predicted, common, saved_added)
 
 

@@ -249,7 +249,8 @@ def step_checks(
 def _from_joint_states(name: str, result: StepResult, bounds: Tolerances) -> Finding:
     """What positions say by the data of the robot, against the meter."""
     least = _least(result, bounds)
-    below = above = max(bounds.indirect_relative * abs(result.energy), least)
+    below = max(bounds.indirect_relative * abs(result.energy), least)
+    above = below
     why = _share(bounds.indirect_relative, least)
     report = result.step.movement.report
     if bounds.within_interval and report.energy_high > report.energy_low:

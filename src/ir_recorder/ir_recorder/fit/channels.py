@@ -92,7 +92,8 @@ class Meter:
     def predicted(self, x: FloatArray, softness: float) -> tuple[FloatArray, FloatArray]:
         """Watts (R,) and their slopes (R, P + E)."""
         mean = x[: len(x) - self._extra]
-        watts, slopes = [], []
+        watts = []
+        slopes = []
         for run in self._runs:
             found = self._model.watts_and_slopes(mean, run.prepared, softness)
             watts.append(run.samples.metered(found[0]))

@@ -151,7 +151,8 @@ def without_turns(joints: Trace, robot: RobotModel) -> tuple[Trace, list[str]]:
             continue
         followed = q.copy()
         followed[known] = np.unwrap(q[known])
-        lowest, highest = float(np.nanmin(followed)), float(np.nanmax(followed))
+        lowest = float(np.nanmin(followed))
+        highest = float(np.nanmax(followed))
         turns = 0
         if not low - _BEYOND <= lowest <= highest <= high + _BEYOND:
             turns = round((0.5 * (lowest + highest) - 0.5 * (low + high)) / _TURN)

@@ -133,7 +133,8 @@ def widening(
         for own in (slopes[fold == k],)
     ]
     whole = np.sum([information for information, _ in parts], axis=0)
-    factor = best = 1.0
+    factor = 1.0
+    best = 1.0
     least = np.inf
     while factor < _MOST:
         errors = []
@@ -335,7 +336,8 @@ class Estimate:
                 break
             x, weight, noise = self._reweighted(x, weight)
         x, precision = self.solve(x, weight, self._free)
-        fitted_with = inflation = 1.0
+        fitted_with = 1.0
+        inflation = 1.0
         if self.meter is not None:
             fitted_with = self._widening(x, weight)
             weight = weight / np.sqrt(fitted_with)
@@ -378,10 +380,14 @@ class Estimate:
             sources=tuple(str(source) for source in sources),
         )
         none = np.zeros(0)
-        time = measured = before = after = none
+        time = none
+        measured = none
+        before = none
+        after = none
         moves: tuple[FittedMovement, ...] = ()
         if self.meter is not None:
-            time, measured = self.meter.time(), self.meter.measured
+            time = self.meter.time()
+            measured = self.meter.measured
             before, after = (
                 self.meter.predicted(np.concatenate([each, self.found[count:]]), 0.0)[0]
                 for each in (self.prior.mean, mean)
@@ -646,7 +652,8 @@ class Estimate:
         fold: IntArray,
     ) -> list[Stretch]:
         """What a movement or a rest misses: its energy at the mains, and the work of its motors."""
-        first, last = run.first + span[0] // WINDOW, run.first + span[1] // WINDOW
+        first = run.first + span[0] // WINDOW
+        last = run.first + span[1] // WINDOW
         found = []
         begin = 0
         for channel in self._channels:

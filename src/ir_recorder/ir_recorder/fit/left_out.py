@@ -186,7 +186,8 @@ def _energies(
             off = float(watts[first:behind].sum()) - energy
             errors.append(off / energy)
             if covariance is not None:
-                begin, end = run.first + first // WINDOW, run.first + behind // WINDOW
+                begin = run.first + first // WINDOW
+                end = run.first + behind // WINDOW
                 rows = (estimate.window >= begin) & (estimate.window < end)
                 rows &= np.arange(len(rows)) < len(estimate.meter.measured)  # type: ignore[union-attr]
                 slope = WINDOW * slopes[rows].sum(axis=0)

@@ -55,7 +55,8 @@ class CellView:
 
     def __init__(self) -> None:
         self.scene = b""
-        self._text = self._scene_id = ""
+        self._text = ""
+        self._scene_id = ""
         self._states: tuple[tuple[str, str], ...] = ()
         self._read_cell: Cell | None = None  # as its file has it
         self._standing: dict[str, tuple[str, ...]] = {}  # machines that stand otherwise, or change
@@ -106,7 +107,8 @@ class CellView:
         self._read_cell = None
         self._standing = {}
         try:
-            self._cell = self._read_cell = cell_from_yaml(text) if text else None
+            self._cell = cell_from_yaml(text) if text else None
+            self._read_cell = self._cell
             self._problem = ""
         except DescriptionError as error:
             self._problem = one_line(f"the planner's cell can't be read: {error}", 300)

@@ -83,7 +83,8 @@ class LiveNode(Node):
         self._view = CellView()
         self._worker = ThreadPoolExecutor(1, "cell")
         self._looking: Future[dict[str, Json]] | None = None
-        self._looked = self._powered = -math.inf
+        self._looked = -math.inf
+        self._powered = -math.inf
         self._heard = Heard()
         self._ended = list[PlannedMovement | None]()
         self._driven = ""

@@ -184,7 +184,8 @@ class LiveServer:
         except (OSError, OverflowError) as error:
             raise LiveError(f"port {port} of {ADDRESS} can't be listened on: {error}") from error
         self.port = int(self._server.server_address[1])
-        self._server.guard = self.guard = Guard(self.port)
+        self.guard = Guard(self.port)
+        self._server.guard = self.guard
         self._server.stream = stream
         self._server.press = press
         self._server.scene = scene

@@ -46,7 +46,11 @@ class ChunkReader:
 
     def __init__(self, limits: ReadLimits) -> None:
         self._limits = limits
-        self._used = self._given = self._claimed = self._channels = self._cheap = 0
+        self._used = 0
+        self._given = 0
+        self._claimed = 0
+        self._channels = 0
+        self._cheap = 0
 
     def records(self, chunk: Chunk) -> list[McapRecord]:
         """What is in the chunk; its check sum is compared."""

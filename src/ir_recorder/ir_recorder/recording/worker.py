@@ -43,7 +43,8 @@ class RecordingWorker:
         self._session = session
         self._most = most
         self._queue: SimpleQueue[Act | list[Message] | None] = SimpleQueue()
-        self._put = self._taken = 0  # bytes; each is written by one thread only
+        self._put = 0  # bytes; each is written by one thread only
+        self._taken = 0
         self._failure: WriteError | None = None
         self._summary: RecordingSummary | None = None
         self.dropped = 0

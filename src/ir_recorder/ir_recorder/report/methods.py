@@ -173,7 +173,8 @@ def _fitness(log: CorrectionLog, corner: tuple[float, float]) -> str:
     values = [value for each in log.fitness for value in each if value > 0.0]
     if len(values) < 2:
         return ""
-    (left, top), (width, height) = corner, _CHART
+    left, top = corner
+    width, height = _CHART
     low = math.log(min(values))
     high = math.log(max(values))
     longest = max(len(each) for each in log.fitness)

@@ -87,8 +87,16 @@ def _packet(text: str, count: int, where: str) -> list[float]:
 
 # A trace: #BEGINCHANNELHEADER, then lines "number,value" for each channel.
 
-_NAME, _UNIT, _KIND, _FILE, _STORED, _TYPE = "200", "202", "210", "211", "213", "214"
-_COUNT, _FIRST, _OFFSET, _SCALE = "220", "221", "240", "241"
+_NAME = "200"
+_UNIT = "202"
+_KIND = "210"
+_FILE = "211"
+_STORED = "213"
+_TYPE = "214"
+_COUNT = "220"
+_FIRST = "221"
+_OFFSET = "240"
+_SCALE = "241"
 _DTYPES = {"REAL64": "<f8", "REAL32": "<f4", "INT16": "<i2", "INT32": "<i4"}
 _IMPLICIT = ("IMPLICIT", "IMPLIZIT")
 _HEADER_BYTES = 4_000_000

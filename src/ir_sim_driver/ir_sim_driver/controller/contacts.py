@@ -156,7 +156,8 @@ class ContactWatch:
             if pairs.any()
         )
         self._allowed: BoolArray = scene.allowed(station)
-        self._inside = self._any = bool(self._allowed.any())
+        self._any = bool(self._allowed.any())
+        self._inside = self._any
         plain = self._plain()
         pairs = scene.model.pairs
         self.thresholds = self._relaxed(q, plain)
@@ -190,7 +191,8 @@ class ContactWatch:
         plain = self._plain()
         self._station = station
         self._allowed = self._scene.allowed(station)
-        self._inside = self._any = bool(self._allowed.any())
+        self._any = bool(self._allowed.any())
+        self._inside = self._any
         self.thresholds = np.where(before < plain, np.minimum(before, self._plain()), self._plain())
         self._start()
 
@@ -473,9 +475,10 @@ class CellWatch:
         """Build the scene anew. standing: what touches now was there before, or was put there by
         hand.
         """
-        self._scene = scene = ContactScene.of(
+        scene = ContactScene.of(
             self._cell, self._tool.chain, self._load, self._machines, self._parts
         )
+        self._scene = scene
         touching = self._contacts.watch(scene, self._backend.q, self._station, standing)
         self.due = 0
         if touching:

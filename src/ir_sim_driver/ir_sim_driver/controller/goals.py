@@ -206,7 +206,8 @@ class Goals:
         """
         calls = []
         if self._stop_seen != self._simulation.stop_number:
-            self._stop_seen = number = self._simulation.stop_number
+            number = self._simulation.stop_number
+            self._stop_seen = number
             ended_now = refused(ended_by_stop(number))
             calls = [(ended, ended_now) for ended in self._queue.end_before(number)]
         for outcome in outcomes:

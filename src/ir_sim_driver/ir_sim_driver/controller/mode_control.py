@@ -22,7 +22,10 @@ class Latches:
     """
 
     def __init__(self) -> None:
-        self.drives_off = self.recover = self.restart = self.wake = False
+        self.drives_off = False
+        self.recover = False
+        self.restart = False
+        self.wake = False
         self.end_rest: int | None = None
         self.end_rest_by = ""
 
@@ -62,7 +65,8 @@ class Latches:
         if before is Mode.FROM_HIBERNATION:
             self.restart = False
         if now in OFF_THE_NETWORK:
-            self.restart = self.drives_off = False
+            self.restart = False
+            self.drives_off = False
             plc.off_by.clear()
             plc.stop.leave_network()
 

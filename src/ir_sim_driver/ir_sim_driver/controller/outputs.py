@@ -64,7 +64,10 @@ class Frames:
         self._steps = steps
         self._outputs: PlcOutputs | None = None
         self._inputs: PlcInputs | None = None
-        self._energy = self._dissipated = self._rectified = self._metered = 0.0
+        self._energy = 0.0
+        self._dissipated = 0.0
+        self._rectified = 0.0
+        self._metered = 0.0
 
     def joints(self, stamp_ns: int) -> Joints:
         """The joints of now."""
@@ -77,12 +80,15 @@ class Frames:
         """The frame around these joints of now."""
         simulation = self._simulation
         backend = simulation.backend
-        outputs = following = power = None
+        outputs = None
+        following = None
+        power = None
         if simulation.steps % POWER_PERIOD < self._steps:
             power = self._power(joints.stamp_ns)
             present = simulation.outputs()
             if present != self._outputs:
-                self._outputs = outputs = present
+                self._outputs = present
+                outputs = present
         if joints.q is None:
             return Frame(
                 joints, simulation.load, power, None, outputs, stop_number=simulation.stop_number

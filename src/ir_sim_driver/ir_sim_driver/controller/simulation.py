@@ -167,7 +167,8 @@ class Simulation:
         settings: SimulationSettings | None = None,
         plant: Plant | None = None,
     ) -> None:
-        self.settings = settings = settings or SimulationSettings()
+        settings = settings or SimulationSettings()
+        self.settings = settings
         self.cell = cell
         self.robot = cell.robot
         self.backend = backend

@@ -161,7 +161,9 @@ class LoadChecks:
         finding = weighed(motion, declared, self._settings.threshold)
         if finding is None:
             return None
-        self.last = self._new = finding = replace(finding, trajectory_id=trajectory_id)
+        finding = replace(finding, trajectory_id=trajectory_id)
+        self.last = finding
+        self._new = finding
         if finding.noticed:
             self._notices.add(Level.WARN, finding.sentence)
         return finding

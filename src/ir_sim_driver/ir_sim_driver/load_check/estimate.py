@@ -54,7 +54,8 @@ class Uncertainty:
         marks: Mapping[str, str],
         base_pose: FloatArray,
     ) -> None:
-        self.model = model = parameters.robot_with(robot)
+        model = parameters.robot_with(robot)
+        self.model = model
         self._base_pose = base_pose
         places = [
             parameters.index(f"{term}.{joint}")

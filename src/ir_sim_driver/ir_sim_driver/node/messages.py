@@ -146,7 +146,9 @@ def fill_points(desired: Any, actual: Any, error: Any, following: Following) -> 
     """Command, robot and their difference, into three JointTrajectoryPoints."""
     command = following.command
     at = duration_to_msg(max(0, round(following.path_time / _NS)))
-    desired.time_from_start = actual.time_from_start = error.time_from_start = at
+    desired.time_from_start = at
+    actual.time_from_start = at
+    error.time_from_start = at
     desired.positions = float_array(command.q)
     desired.velocities = float_array(command.qd)
     desired.accelerations = float_array(command.qdd)

@@ -97,9 +97,10 @@ class SimDriver(Node):
 
     def __init__(self, simulation: Simulation | None = None, **node_options: Any) -> None:
         super().__init__(names.SIM_DRIVER, **node_options)
-        self._configuration = configuration = DriverParameters(
+        configuration = DriverParameters(
             self, self._change_refusal, lambda settings: self._driver.set_execution(settings)
         )
+        self._configuration = configuration
         self.add_on_set_parameters_callback(self._keep_time)
         options = configuration.node
         simulation = simulation or make_simulation(
@@ -170,7 +171,8 @@ class SimDriver(Node):
         if follow is not None:
             self._actions.append(self._serve_action(follow, own(names.FOLLOW_JOINT_TRAJECTORY)))
         StateQueries(self._driver).offer(self)
-        self._answers = answers = Services(self._driver, self.get_name(), self._announcements.look)
+        answers = Services(self._driver, self.get_name(), self._announcements.look)
+        self._answers = answers
         self._presses = OwnParticipant(self, "presses")
         self._requests = OwnParticipant(self, "requests")
         self._inputs = PolledService(

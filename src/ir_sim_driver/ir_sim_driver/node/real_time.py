@@ -61,7 +61,8 @@ class Grid:
         self._period = period_ns
         self._stamp = 0  # the next one; 0: the grid has not begun
         self._reach = 0.0  # stamps up to here may be taken now
-        self._seen = self._wall = 0
+        self._seen = 0
+        self._wall = 0
         self.gap = ""
         self.lag = 0.0
 

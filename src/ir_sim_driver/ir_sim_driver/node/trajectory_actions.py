@@ -230,7 +230,8 @@ def _said(field: str) -> str:
 
 def _emptied(head: Any) -> None:
     """Leave out the points, and what else is too long."""
-    head.trajectory.points.size = head.multi_dof.points.size = 0
+    head.trajectory.points.size = 0
+    head.multi_dof.points.size = 0
     names = (head.trajectory.joint_names, head.multi_dof.joint_names)
     for each in (*names, *(getattr(head, name) for name in head.lists)):
         each.size = each.size if each.size <= _NAMES_MAX else 0

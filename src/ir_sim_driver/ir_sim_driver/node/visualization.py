@@ -60,7 +60,8 @@ class RobotMarkers:
         turned = (Rotation.from_matrix(poses[:, :3, :3]) * self._turns).as_quat()
         places = zip(self._pairs, ends.mean(axis=1), turned, ends, strict=True)
         for (cylinder, balls), centre, quaternion, both in places:
-            cylinder.header.stamp = balls.header.stamp = stamp
+            cylinder.header.stamp = stamp
+            balls.header.stamp = stamp
             place = cylinder.pose.position
             place.x, place.y, place.z = centre.tolist()
             turn = cylinder.pose.orientation

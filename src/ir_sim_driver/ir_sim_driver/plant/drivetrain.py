@@ -81,7 +81,8 @@ class Gears:
     """
 
     def __init__(self, figures: GearFigures, dt: float) -> None:
-        f = self._figures = figures
+        f = figures
+        self._figures = figures
         self._dt = dt
         self._plain = not (f.load_driven.any() or f.load_back.any() or f.stribeck.any())
         dry = (f.coulomb, f.load_driven, f.load_back, f.stribeck, 1.0 / np.array(f.stribeck_speed))

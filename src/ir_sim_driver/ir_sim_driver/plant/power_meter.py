@@ -159,7 +159,8 @@ class DcCircuit:
         if self._regeneration == "fed_back" or (self._on == self._off and not self._closed):
             supplied, over = self._ideal(power * self._dt)
             return (supplied - over, 0.0) if self._regeneration == "fed_back" else (supplied, over)
-        supplied = dissipated = 0.0
+        supplied = 0.0
+        dissipated = 0.0
         left = self._dt
         for _ in range(_EVENTS):
             if left <= 0.0:
@@ -279,13 +280,18 @@ class PowerMeter:
         self._loads: list[tuple[int, float, float, bool, bool]] = []  # steps that have the same
         self._pending = 0
         self._steps = 0
-        self._supplied = self._dissipated = self._rectifier = self._base_energy = (
-            self._tool_energy
-        ) = 0.0
+        self._supplied = 0.0
+        self._dissipated = 0.0
+        self._rectifier = 0.0
+        self._base_energy = 0.0
+        self._tool_energy = 0.0
         n = len(plant.robot.joint_names)
         self._parts: FloatArray = np.zeros((4, n))  # mechanical, copper, inverter, iron [J]
-        self._power = self._torque = self._current = np.zeros(n)
-        self._last_base = self._last_tool = 0.0
+        self._power = np.zeros(n)
+        self._torque = np.zeros(n)
+        self._current = np.zeros(n)
+        self._last_base = 0.0
+        self._last_tool = 0.0
 
     def add(
         self,

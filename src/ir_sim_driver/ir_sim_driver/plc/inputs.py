@@ -204,7 +204,9 @@ class Plc:
         self._fell = 0  # order of the message that let go of the emergency stop
         self._up = 0.0  # s since then
         self.no_hibernation = ""
-        self.drives_on = self.confirm = self.restart = False
+        self.drives_on = False
+        self.confirm = False
+        self.restart = False
         self._gave: dict[str, set[str]] = {bit: set() for bit in OWN_BITS}  # since it was 0
         self.off_by: set[str] = set()
         self._ages: dict[str, float] = {}
@@ -348,7 +350,9 @@ class Plc:
         if self._uptime >= self._warn_at:
             self._warn_at = inf
             self._notices.add(Level.WARN, self._warning)
-        self.drives_on = self.confirm = self.restart = False
+        self.drives_on = False
+        self.confirm = False
+        self.restart = False
         if self.stop.pressed:
             self._let_go(dt)
         if self._ages:

@@ -276,7 +276,8 @@ class CellModel:
         for event, lag in bindings:
             i = self.instance.robot_of[lag.earlier]
             j = self.instance.robot_of[lag.later]
-            linked[i][j] = linked[j][i] = True
+            linked[i][j] = True
+            linked[j][i] = True
             if i == j or self._conditions(event) or self._conditions(_Event(lag.later)):
                 continue
             # phase_i - phase_j <= late_j - early_i - length + height * cycle
@@ -359,7 +360,8 @@ class CellModel:
     def _conflicts(self) -> None:
         grouped: dict[tuple[int, int], set[tuple[int, int]]] = {}
         for conflict in self.instance.conflicts:
-            (a, g), (b, h) = conflict.first, conflict.second
+            a, g = conflict.first
+            b, h = conflict.second
             if self.instance.robot_of[a] == self.instance.robot_of[b]:
                 continue
             if a > b:
@@ -382,8 +384,10 @@ class CellModel:
             max(self._clocks[j].phase_low - self._clocks[i].phase_high, -self._apart[j][i]),
             min(self._clocks[j].phase_high - self._clocks[i].phase_low, self._apart[i][j]),
         )
-        start_a, end_a = self._clocks[i].begins[a], self._clocks[i].ends[a]
-        start_b, end_b = self._clocks[j].begins[b], self._clocks[j].ends[b]
+        start_a = self._clocks[i].begins[a]
+        end_a = self._clocks[i].ends[a]
+        start_b = self._clocks[j].begins[b]
+        end_b = self._clocks[j].ends[b]
         end_a = (end_a[0], cycle) if self._closes(a) else end_a
         end_b = (end_b[0], cycle) if self._closes(b) else end_b
         later = (phases[0] + start_b[0] - end_a[1], phases[1] + start_b[1] - end_a[0])
@@ -461,7 +465,8 @@ class CellModel:
 
     def _first_tangents(self, moving: _Moving) -> None:
         curve = moving.movement.curve
-        low, high = curve.least, moving.most
+        low = curve.least
+        high = moving.most
         ratio = (high / low) ** (1.0 / max(_FIRST_TANGENTS - 1, 1))
         points = [low * ratio**k for k in range(_FIRST_TANGENTS)]
         points.append(min(max(curve.cheapest(), low), high))

@@ -93,7 +93,8 @@ class Kept:
             used = self._used.get(own)
             if used is None:
                 stop = threading.Event()
-                used = self._used[own] = _Used(make(stop.is_set), stop)
+                used = _Used(make(stop.is_set), stop)
+                self._used[own] = used
             if used.waiting is not None:
                 used.waiting.cancel()
             used.busy = True

@@ -219,7 +219,8 @@ class _Patches(NamedTuple):
         return self._replace(along=self.along[which], around=self.around[which])
 
     def quartered(self) -> _Patches:
-        a, b = 0.5 * self.half[0], 0.5 * self.half[1]
+        a = 0.5 * self.half[0]
+        b = 0.5 * self.half[1]
         along = np.concatenate([self.along + i * a for i in (-1, 1) for _ in (-1, 1)])
         around = np.concatenate([self.around + j * b for _ in (-1, 1) for j in (-1, 1)])
         return _Patches(along, around, (a, b), 0.5 * self.radius)

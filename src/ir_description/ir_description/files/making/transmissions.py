@@ -53,7 +53,8 @@ def coupling_notes(found: Sequence[UrdfTransmission], axes: Sequence[str]) -> It
             if each.kind == FOUR_BAR:
                 rows = f"[[{second}, {first}, {1.0 / each.reductions[1]:.4g}]]"
             else:
-                there, back = f"{share:.4g}", f"{-1.0 / share:.4g}"
+                there = f"{share:.4g}"
+                back = f"{-1.0 / share:.4g}"
                 rows = f"[[{first}, {second}, {there}], [{second}, {first}, {back}]]"
             said += (
                 f": wrist_coupling: {{value: {rows}, source: URDF, confidence: M}}, if its joints "

@@ -408,7 +408,8 @@ class _Gathering:
         lower, upper = self._range(joint)
         endless = joint.kind == "continuous" and not lower < upper
         if endless or (joint.kind != "prismatic" and upper - lower > 2.0 * np.pi):
-            lower, upper = -np.pi, np.pi
+            lower = -np.pi
+            upper = np.pi
         kind = "prismatic" if joint.kind == "prismatic" else "revolute"
         return SideMotion(joint.name, kind, joint.pose, joint.axis, lower, upper)
 
