@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from ir_msgs_py.ros.testing import PATIENCE
-from ir_recorder.errors import LiveError
+from ir_recorder.errors import RecorderError
 from ir_recorder.live.server import (
     BITS,
     MOST_ASKING,
@@ -251,9 +251,9 @@ def test_a_stop_finds_a_place_among_waiting_requests_and_is_taken_first(wait_for
 
 
 def test_a_port_that_is_taken_is_named_and_others_are_free(cell: Cell) -> None:
-    with pytest.raises(LiveError, match=str(cell.server.port)):
+    with pytest.raises(RecorderError, match=str(cell.server.port)):
         LiveServer(Stream(), cell.press, lambda: b"", cell.server.port)
-    with pytest.raises(LiveError, match="70000"):
+    with pytest.raises(RecorderError, match="70000"):
         LiveServer(Stream(), cell.press, lambda: b"", 70_000)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from ir_recorder.errors import PathError, SplitError
+from ir_recorder.errors import PathError, RecorderError
 from ir_recorder.format.contents import Split, is_further_part, part_path
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.reading.mcap_file import RawRecording, read_raw
@@ -113,11 +113,11 @@ def test_a_folder_counts_a_recording_in_several_files_once(tmp_path: Path) -> No
 
 def test_files_that_are_too_small_or_would_meet_others_are_refused(tmp_path: Path) -> None:
     with pytest.raises(
-        SplitError, match="split_size is 10 bytes: it must be 0 or at least 1,000,000"
+        RecorderError, match="split_size is 10 bytes: it must be 0 or at least 1,000,000"
     ):
         Split(size=10)
     for wrong in (0.5, -1.0, float("nan"), float("inf")):
-        with pytest.raises(SplitError, match="must be 0 or at least 1"):
+        with pytest.raises(RecorderError, match="must be 0 or at least 1"):
             Split(duration=wrong)
     (tmp_path / "a_1.mcap").touch()
     with pytest.raises(PathError, match=r"a_1\.mcap is there already"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ir_recorder.errors import TopicsError
+from ir_recorder.errors import RecorderError
 from ir_recorder.recording.topics import TopicSelection, checked_topics, single_type
 
 
@@ -50,7 +50,7 @@ def test_topics_of_several_types_are_passed_over() -> None:
     ],
 )
 def test_topics_that_cannot_be_ones_are_refused(topics: list[str], sentence: str) -> None:
-    with pytest.raises(TopicsError, match=sentence):
+    with pytest.raises(RecorderError, match=sentence):
         checked_topics(topics)
 
 

@@ -7,16 +7,12 @@
     ├── WriteError       the disk refused while recording: full, read-only
     │   └── LostFileError    the file was deleted or replaced, its disk unmounted
     ├── SchemaError      no definition of a message type is installed
-    ├── SplitError       files so small that there would be thousands
-    ├── TopicsError      names of topics that are none, or too many
-    ├── NothingRecordedError   a recording was asked to end, and none is in progress
-    ├── ReadError        not a recording at all, or nothing in it that could be read
-    └── LiveError        the live view can't be served
+    └── ReadError        not a recording at all, or nothing in it that could be read
 """
 
 
 class RecorderError(Exception):
-    """Root of what this package raises."""
+    """Root of what this package raises; the sentence says what is refused, and why."""
 
 
 class PathError(RecorderError):
@@ -35,21 +31,5 @@ class SchemaError(RecorderError):
     """A message type whose definition isn't installed."""
 
 
-class SplitError(RecorderError):
-    """A size or a duration of files that makes no sense."""
-
-
-class TopicsError(RecorderError):
-    """A request names topics that can't be ones."""
-
-
-class NothingRecordedError(RecorderError):
-    """There is no recording to end."""
-
-
 class ReadError(RecorderError):
     """A file that isn't a recording, or holds nothing readable."""
-
-
-class LiveError(RecorderError):
-    """The live view can't be served; the sentence says why."""

@@ -148,7 +148,7 @@ class Control:
 
 
 class Session:
-    """Shows a cell until `run` returns; `close` ends its threads. LiveError where the port is
+    """Shows a cell until `run` returns; `close` ends its threads. RecorderError where the port is
     taken.
     """
 

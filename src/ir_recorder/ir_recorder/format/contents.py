@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from ir_recorder.errors import SplitError
+from ir_recorder.errors import RecorderError
 
 # Names of what a recording holds beside its messages: attachments and the record of facts.
 
@@ -70,11 +70,11 @@ class Split:
 
     def __post_init__(self) -> None:
         if self.size and self.size < LEAST_SIZE:
-            raise SplitError(
+            raise RecorderError(
                 f"split_size is {self.size} bytes: it must be 0 or at least {LEAST_SIZE:,}"
             )
         if not (self.duration == 0.0 or LEAST_DURATION <= self.duration < float("inf")):
-            raise SplitError(
+            raise RecorderError(
                 f"split_duration is {self.duration:g} s: it must be 0 or at least "
                 f"{LEAST_DURATION:g}"
             )

@@ -30,7 +30,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, NamedTuple
 
 from ir_msgs_py.plc import PlcInputs
-from ir_recorder.errors import LiveError
+from ir_recorder.errors import RecorderError
 from ir_recorder.live.stream import Stream
 from ir_recorder.report.page import asset
 from ir_values.errors import one_line
@@ -167,7 +167,7 @@ class LiveServer:
     """Serves a stream to browsers from a thread of its own until it is closed.
 
     press: does what a control asks for; scene: the cell as JSON, b"" while it isn't known; site:
-    the page. LiveError where the port is taken. port 0: a free one.
+    the page. RecorderError where the port is taken. port 0: a free one.
     """
 
     def __init__(
@@ -182,7 +182,9 @@ class LiveServer:
         try:
             self._server = _Server((ADDRESS, port), _Handler)
         except (OSError, OverflowError) as error:
-            raise LiveError(f"port {port} of {ADDRESS} can't be listened on: {error}") from error
+            raise RecorderError(
+                f"port {port} of {ADDRESS} can't be listened on: {error}"
+            ) from error
         self.port = int(self._server.server_address[1])
         self.guard = Guard(self.port)
         self._server.guard = self.guard

@@ -25,7 +25,6 @@ from ir_msgs_py.status import Status, StatusCode
 from ir_recorder.arguments import record_parser, roots_of
 from ir_recorder.errors import (
     LostFileError,
-    NothingRecordedError,
     PathError,
     RecorderError,
     SchemaError,
@@ -100,7 +99,7 @@ class Services:
             lost = self._recorder.failure
             summary = self._recorder.finish()
             if summary is None:
-                raise NothingRecordedError(self._recorder.failure or "nothing is being recorded")
+                raise RecorderError(self._recorder.failure or "nothing is being recorded")
             response.path = str(summary.path)
             response.paths = [str(path) for path in summary.paths]
             response.messages = summary.messages
@@ -273,7 +272,7 @@ class RecorderNode(Node):
         """Opens a recording below `roots` (None: those of the settings) and returns its absolute
         path.
 
-        PathError, SplitError or WriteError when it can't.
+        RecorderError when it can't.
         """
         if self._recording is not None:
             raise PathError(f"already recording into {self._recording.session.path}; stop first")

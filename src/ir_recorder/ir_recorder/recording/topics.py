@@ -13,7 +13,7 @@ from fnmatch import fnmatchcase
 
 from ir_msgs_py import names
 from ir_msgs_py.names import NODES
-from ir_recorder.errors import TopicsError
+from ir_recorder.errors import RecorderError
 
 SHARED = (
     names.JOINT_STATES,
@@ -29,17 +29,17 @@ _FEEDBACK = "_FeedbackMessage"
 
 
 def checked_topics(topics: Iterable[str]) -> tuple[str, ...]:
-    """Names and patterns of a request without the empty ones; TopicsError where they are no
+    """Names and patterns of a request without the empty ones; RecorderError where they are no
     names.
     """
     wanted = tuple(topic for topic in topics if topic)
     if len(wanted) > MOST_TOPICS:
-        raise TopicsError(
+        raise RecorderError(
             f"{len(wanted)} names or patterns of topics: at most {MOST_TOPICS} are taken"
         )
     for topic in wanted:
         if len(topic) > LONGEST_TOPIC or not topic.isprintable():
-            raise TopicsError(
+            raise RecorderError(
                 f"topic {topic[:60]!a}: at most {LONGEST_TOPIC} characters, without control "
                 "characters"
             )
