@@ -19,8 +19,14 @@ from ir_planner.checks.energy import movement_energy
 from ir_planner.checks.verification import verify
 from ir_planner.curves.uniform_spline import along_path
 from ir_planner.errors import CancelledError, RequestError
-from ir_planner.optimize.fixed_path import FixedPath, never_back
-from ir_planner.optimize.path_timing import KEPT, Passing, PathTiming, along_its_path
+from ir_planner.optimize.path_timing import (
+    KEPT,
+    FixedPath,
+    Passing,
+    PathTiming,
+    along_its_path,
+    never_back,
+)
 from ir_planner.optimize.spline_cost import spline_cost
 from ir_planner.regional.regional import MovementPlan
 from ir_planner.request.context import Context, Work
