@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from ir_recorder import Tolerances
-from ir_recorder.recording.settings import RecorderSettings
-from ir_values.settings import describe, settings_table
+from ir_values.settings import settings_table
 
 PAGE = (Path(__file__).parents[2] / "docs" / "recording.md").read_text(encoding="utf-8")
 SNIPPETS = re.findall(r"```python\n(.*?)```", PAGE, re.S)
@@ -19,11 +18,6 @@ SNIPPETS = re.findall(r"```python\n(.*?)```", PAGE, re.S)
 def test_snippets_run(code: str, demo_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     exec(compile(code.replace("out/demo.mcap", str(demo_file)), "recording.md", "exec"), {})
     assert capsys.readouterr().out
-
-
-def test_every_parameter_is_in_the_table() -> None:
-    for setting in describe(RecorderSettings):
-        assert f"| `{setting.name}` |" in PAGE
 
 
 def test_the_table_of_bounds_is_that_of_the_settings() -> None:
