@@ -15,7 +15,7 @@ from scipy.spatial import ConvexHull
 from ir_cli.home_posture import ROOMS
 from ir_cli.main import main
 from ir_cli.robot_from_urdf import RobotSource, made_robot
-from ir_cli.robot_shapes import SAFETY
+from ir_cli.self_pairs import SAFETY
 from ir_description.files.making import urdf_arm
 from ir_kernels import Chain, CollisionModel
 

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ir_cli.robot_shapes import FLOOR_ROOM, ROOM, SAFETY, Pairs, floor_below, lowest_points
+from ir_cli.robot_shapes import FLOOR_ROOM, floor_below, lowest_points
+from ir_cli.self_pairs import ROOM, SAFETY, Pairs
 from ir_description import Capsule, InvalidValueError
 from ir_description.files.making import UrdfArm, holding_torques
 from ir_kernels import Chain, CollisionModel

@@ -13,7 +13,8 @@ import numpy as np
 from ir_cli.errors import CommandError, InputError
 from ir_cli.home_posture import Postures
 from ir_cli.robot_remarks import remarks_on
-from ir_cli.robot_shapes import Pairs, Shapes, capsules_of, kept_sentence, pairs_of
+from ir_cli.robot_shapes import Shapes, capsules_of
+from ir_cli.self_pairs import Pairs, kept_sentence, pairs_of
 from ir_description import DescriptionError, InvalidValueError, RobotFileError, RobotModel
 from ir_description.files import read_regular_file, robot_from_yaml, text_of
 from ir_description.files.making import (

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ir_cli.robot_shapes import kept_sentence
+from ir_cli.self_pairs import kept_sentence
 from ir_description import Load, RobotModel
 from ir_kernels import (
     Chain,

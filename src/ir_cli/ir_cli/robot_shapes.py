@@ -1,4 +1,4 @@
-"""Capsules of a robot that is made from a URDF, and which of them can touch."""
+"""Capsules of a robot that is made from a URDF, and the floor below it."""
 
 from __future__ import annotations
 
@@ -6,13 +6,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ir_description import Capsule
-from ir_description.files.convex_pieces import halved
 from ir_description.files.making import CapsuleFit, LinkBody, UrdfArm, encloses, fitted
-from ir_description.robot import ReducedDistance
-from ir_kernels import Chain, CollisionModel
+from ir_kernels import Chain
 from ir_values.arrays import FloatArray
 
 WRITTEN = 1e-9  # m: by which the digits of a file may move a capsule
@@ -126,168 +123,3 @@ def lowest_points(chain: Chain, q: FloatArray, capsules: Sequence[Capsule]) -> F
         for end in (each.p0, each.p1)
     ]
     return np.asarray(np.min(heights, axis=0)) if heights else np.full(len(q), np.inf)
-
-
-# Which pairs can touch. Neighbours are left out: their bodies meet at the joint. Others that are
-# near in many postures are near by construction: they keep a distance of their own, so that
-# capsules that are wider than the bodies leave the robot its work.
-
-SAFETY = 0.02
-"""Safety distance [m] of a request that says nothing."""
-POSTURES = 3000
-NEAR = 0.25
-"""Share of postures that a pair may take from the robot before it counts as near by
-construction.
-"""
-ROOM = 0.002
-"""m below the nearest posture in which the bodies were seen to be free."""
-_BODY_POSTURES = 60
-_LEFT = 0.3  # of the postures that a pair must leave to be told apart by its capsules
-_DEEPEST = 0.1  # of the postures of a pair that is built so, which are not allowed
-_SAMPLES = 6_000
-_FAR = 0.05  # m: bodies that are farther apart need no figure
-
-
-class Pairs(NamedTuple):
-    """Pairs of capsules that can touch; those of them that keep a distance of their own."""
-
-    pairs: tuple[tuple[str, str], ...]
-    reduced: tuple[ReducedDistance, ...]
-
-
-def pairs_of(
-    arm: UrdfArm,
-    capsules: tuple[Capsule, ...],
-    bodies: Sequence[Sequence[LinkBody]],
-    low: FloatArray,
-    high: FloatArray,
-) -> Pairs:
-    """All pairs of capsules of links that are no neighbours; low, high (6,) rad."""
-    far = [
-        (a.name, b.name)
-        for k, a in enumerate(capsules)
-        for b in capsules[k + 1 :]
-        if abs(a.link - b.link) > 1
-    ]
-    chain = Chain(arm)
-    model = CollisionModel(chain, capsules, (), far)
-    q = np.random.default_rng(0).uniform(low, high, (POSTURES, len(low)))
-    distance = model.distances(q)
-    link = {capsule.name: capsule.link for capsule in capsules}
-    shapes = _Bodies(bodies, chain)
-    groups: dict[tuple[int, int], list[int]] = {}
-    for z, pair in enumerate(model.pairs):
-        if float((distance[:, z] <= SAFETY).mean()) > NEAR:
-            groups.setdefault((link[pair.body_a], link[pair.body_b]), []).append(z)
-    reduced = []
-    for (one, other), near in groups.items():
-        apart = shapes.apart(q[:_BODY_POSTURES], one, other)
-        own = [_own_distance(distance[:, z], apart) for z in near]
-        together = (distance[:, near] > [kept for kept, _ in own]).all(axis=1).mean()
-        if together < _LEFT:  # each leaves enough, all together do not
-            own = [_own_distance(distance[:, z], apart, told_apart=False) for z in near]
-        reduced += [
-            ReducedDistance(model.pairs[z].body_a, model.pairs[z].body_b, *each)
-            for z, each in zip(near, own, strict=True)
-        ]
-    return Pairs(tuple(far), tuple(reduced))
-
-
-def _own_distance(
-    distance: FloatArray, apart: FloatArray, *, told_apart: bool = True
-) -> tuple[float, str]:
-    """What a pair with these distances in postures (N,) keeps, and the reason; apart: lower bounds
-    of the distance of the bodies in the first of them; told_apart: whether postures in which bodies
-    are free are told from others by the distance of the capsules.
-    """
-    near = 100.0 * float((distance <= SAFETY).mean())
-    often = f"nearer than {1e3 * SAFETY:g} mm in {near:.0f} % of {len(distance)} postures"
-    taken = np.argsort(distance[: len(apart)], kind="stable")
-    free = apart[taken]  # by rising distance of the capsules
-    meeting = (free <= 0.0) & (distance[taken] <= 0.0)
-    first = int(np.flatnonzero(meeting)[-1]) + 1 if meeting.any() else 0
-    left = len(taken) - first
-    if told_apart and left >= _LEFT * len(taken):
-        kept = min(float(distance[taken[first]]) - ROOM, SAFETY)
-        least = 1e3 * max(float(free[first:].min()), 0.0)
-        return kept, often if kept >= 0.0 else (
-            f"{often}; where the capsules overlap by less, the bodies of the URDF stay {least:.0f} "
-            f"mm apart or more in the {left} postures that were looked at"
-        )
-    kept = min(float(np.quantile(distance, _DEEPEST)) - ROOM, SAFETY)
-    if kept >= 0.0:
-        return kept, often
-    there = int(meeting[distance[taken] > kept].sum())
-    return kept, (
-        f"{often}; the bodies of the URDF themselves meet, or are too near to tell, in {there} of "
-        f"{int((distance[taken] > kept).sum())} postures that were looked at: built so, they come "
-        "no nearer than in nine of ten postures"
-    )
-
-
-def kept_sentence(reduced: ReducedDistance) -> str:
-    """What a pair that is near by construction keeps, and why."""
-    first, second, distance, reason = reduced
-    keep = (
-        f"keep {1e3 * distance:.1f} mm, or the safety distance where that is less"
-        if distance >= 0.0
-        else f"are capsules that may overlap by {-1e3 * distance:.1f} mm"
-    )
-    return f"{first} and {second} {keep}: {reason}"
-
-
-class _Bodies:
-    """Surfaces of the links, and how far two of them are apart."""
-
-    def __init__(self, bodies: Sequence[Sequence[LinkBody]], chain: Chain) -> None:
-        self._bodies = bodies
-        self._chain = chain
-        self._known: dict[int, tuple[FloatArray, FloatArray]] = {}
-        self._apart: dict[tuple[int, int], FloatArray] = {}
-
-    def apart(self, q: FloatArray, one: int, other: int) -> FloatArray:
-        """Lower bounds (N,) [m] of the distance of two links in postures q (N, 6), the same for
-        each pair; at most _FAR.
-        """
-        if (one, other) not in self._apart:
-            self._apart[one, other] = self._bounds(q, one, other)
-        return self._apart[one, other]
-
-    def _bounds(self, q: FloatArray, one: int, other: int) -> FloatArray:
-        first, spread = self._surface(one)
-        second, more = self._surface(other)
-        if not len(first) or not len(second):
-            return np.full(len(q), np.inf)
-        tree = cKDTree(second)
-        poses = self._chain.link_poses(q)
-        result = np.zeros(len(q))
-        for k, pose in enumerate(np.linalg.inv(poses[:, other]) @ poses[:, one]):
-            points = first @ pose[:3, :3].T + pose[:3, 3]
-            found = np.minimum(tree.query(points, distance_upper_bound=_FAR)[0], _FAR)
-            result[k] = (found - spread).min() - more.max()
-        return result
-
-    def _surface(self, link: int) -> tuple[FloatArray, FloatArray]:
-        """Points (N, 3) of a link's surface, and how far around each (N,) there are no others."""
-        if link not in self._known:
-            self._known[link] = _sampled(self._bodies[link])
-        return self._known[link]
-
-
-def _sampled(bodies: Sequence[LinkBody]) -> tuple[FloatArray, FloatArray]:
-    triangles = [body.triangles for body in bodies if body.exact is None]
-    parts = np.concatenate(triangles) if triangles else np.zeros((0, 3, 3))
-    while 0 < len(parts) < _SAMPLES:
-        edges = np.linalg.norm(parts - np.roll(parts, -1, axis=1), axis=2).max(axis=1)
-        long = edges >= np.quantile(edges, 0.7)
-        parts = np.concatenate([parts[~long], halved(parts[long])])
-    centres = parts.mean(axis=1)
-    spread = np.linalg.norm(parts - centres[:, None], axis=2).max(axis=1)
-    points = [centres]
-    spreads = [spread]
-    for body in bodies:
-        if body.exact is not None:
-            p0, p1, radius, _ = body.exact
-            points.append(np.linspace(p0, p1, 20))
-            spreads.append(np.full(20, radius + 0.03 * float(np.linalg.norm(p1 - p0))))
-    return np.concatenate(points), np.concatenate(spreads)

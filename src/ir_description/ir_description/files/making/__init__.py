@@ -1,6 +1,6 @@
 """A robot file from a URDF and what is known of its drives."""
 
-from ir_description.files.making.capsule_fit import CapsuleFit, encloses, fitted
+from ir_description.files.making.capsule_fit import CapsuleFit, beside_axis, encloses, fitted
 from ir_description.files.making.estimates import holding_torques, with_masses
 from ir_description.files.making.link_bodies import LinkBody, Meshes, link_bodies
 from ir_description.files.making.robot_text import (
@@ -24,6 +24,7 @@ __all__ = [
     "Meshes",
     "UrdfArm",
     "Value",
+    "beside_axis",
     "drive_sheet",
     "encloses",
     "estimated_sheet",

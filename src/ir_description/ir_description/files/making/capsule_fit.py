@@ -85,7 +85,7 @@ def with_overhang(fits: Sequence[CapsuleFit], triangles: FloatArray) -> tuple[Ca
 def encloses(outer: CapsuleFit, inner: CapsuleFit) -> bool:
     """Whether a capsule lies in another one."""
     ends = np.array([inner.p0, inner.p1])
-    return bool((_beside(ends, outer) + inner.radius <= outer.radius).all())
+    return bool((beside_axis(ends, outer.p0, outer.p1) + inner.radius <= outer.radius).all())
 
 
 def _cuts(triangles: FloatArray, own: BoolArray) -> list[BoolArray]:
@@ -129,7 +129,7 @@ class _Measure:
         """Points of the grid in any of the capsules."""
         inside = np.zeros(len(self._points), dtype=bool)
         for fit in fits:
-            inside |= _beside(self._points, fit) <= fit.radius
+            inside |= beside_axis(self._points, fit.p0, fit.p1) <= fit.radius
         return float(inside.sum())
 
 
@@ -177,7 +177,7 @@ class _Surface:
             points = patches.points(fit)
             outside = np.ones(len(points), dtype=bool)
             for other in others:
-                outside &= other.radius - _beside(points, other) <= patches.radius
+                outside &= other.radius - beside_axis(points, other.p0, other.p1) <= patches.radius
             patches = patches.chosen(outside)
             if not len(patches.along):
                 return settled
@@ -242,12 +242,12 @@ class _Patches(NamedTuple):
         )
 
 
-def _beside(points: FloatArray, fit: CapsuleFit) -> FloatArray:
-    """Distance (N,) of points (N, 3) from the axis of a capsule."""
-    axis = fit.p1 - fit.p0
+def beside_axis(points: FloatArray, p0: FloatArray, p1: FloatArray) -> FloatArray:
+    """Distance (N,) of points (N, 3) from the axis p0 to p1 of a capsule."""
+    axis = p1 - p0
     square = float(axis @ axis)
-    share = np.clip((points - fit.p0) @ axis / square, 0.0, 1.0) if square > 0.0 else 0.0
-    foot = fit.p0 + np.multiply.outer(share, axis)
+    share = np.clip((points - p0) @ axis / square, 0.0, 1.0) if square > 0.0 else 0.0
+    foot = p0 + np.multiply.outer(share, axis)
     return np.asarray(np.linalg.norm(points - foot, axis=-1))
 
 
