@@ -85,7 +85,7 @@ def made_robot(source: RobotSource) -> MadeRobot:
 
 def _made(source: RobotSource) -> MadeRobot:
     urdf = source.urdf
-    arm = urdf_arm(_urdf_text(source), str(urdf), source.tip, source.without)
+    arm = urdf_arm(urdf_text(source), str(urdf), source.tip, source.without)
     _check_axes(arm)
     meshes = Meshes(urdf.parent, source.packages)
     bodies = tuple(tuple(link_bodies(link.shapes, meshes)) for link in arm.links)
@@ -160,7 +160,8 @@ def _sheet(source: RobotSource, arm: UrdfArm) -> DriveSheet:
     return estimated_sheet(name[:64] or "robot", arm.name[:64], source.payload, arm)
 
 
-def _urdf_text(source: RobotSource) -> str:
+def urdf_text(source: RobotSource) -> str:
+    """The URDF, expanded where it is a xacro file."""
     text = _text(source.urdf)
     if source.urdf.suffix == ".xacro" or "<xacro:" in text:
         return expanded(source.urdf, source.packages, source.settings)

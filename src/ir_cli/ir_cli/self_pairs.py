@@ -32,6 +32,7 @@ ROOM = 0.002
 """m below the distance that a tenth of the postures do not reach."""
 _DEEPEST = 0.1  # of the postures of a pair that is built so, which are not allowed
 _BUILT_SO = 0.5  # of the postures in which points that meet do so by construction
+_LEFT = 0.3  # of the postures that a pair must leave
 _VOXELS = 60  # along a part: one point stands for the surface in each
 _LOOKED_AT = 48  # postures, for what is built so and in a round around those that meet
 _TRIED = 160  # postures in which capsules overlap
@@ -87,10 +88,7 @@ def _own_distance(distance: FloatArray, meeting: _Meeting) -> tuple[float, str]:
         return usual, reason
     least = meeting.largest_distance()
     if meeting.built_so:
-        reason += (
-            f"; {100.0 * meeting.built_so:.2g} % of the surfaces in these capsules meet in most "
-            "postures and are taken for built so"
-        )
+        reason += f"; the bodies of the URDF meet in most postures: {meeting.built_so}"
     if least <= usual:
         return usual, (
             f"{reason}; the bodies of the URDF were not seen to meet where the capsules overlap by "
@@ -193,8 +191,8 @@ def _voxels(triangles: FloatArray, size: float) -> tuple[FloatArray, FloatArray]
 class _Meeting:
     """Postures in which the bodies in two capsules meet, of a link and of one beyond the next.
 
-    built_so: share of their surfaces that meets in most postures: a shaft in its housing. That it
-    meets there says nothing; what of the rest meets anything counts.
+    built_so: what of it is left out because they are built so, as a shaft in its housing, in words;
+    "" for nothing. Of the rest of both surfaces counts what meets anything.
     """
 
     def __init__(
@@ -207,7 +205,9 @@ class _Meeting:
         self._joints = np.arange(one.link, other.link)
         self._sides = (surfaces.within(one), surfaces.within(other))
         self._counted = tuple(np.ones(len(each.at), dtype=bool) for each in self._sides)
-        self.built_so = 0.0
+        self._trees: tuple[cKDTree, ...] = ()
+        self._level = 0.0
+        self.built_so = ""
 
     def largest_distance(self) -> float:
         """What the capsules are apart at most [m] where the bodies meet, in all postures that were
@@ -217,9 +217,22 @@ class _Meeting:
             return 0.0
         self._trees = tuple(cKDTree(each.at) for each in self._sides)
         few = self._q[:_LOOKED_AT]
-        if float(self._meet(few).mean()) >= _BUILT_SO:
-            self._leave_out_what_is_built_so(few)
         distance = self._distances(self._q)
+        found = self._found(distance)
+        if float((distance > found).mean()) >= _LEFT:
+            return found
+        counts = self._meetings(few)
+        self._counted = tuple(each < _BUILT_SO * len(few) for each in counts)
+        self.built_so = "places that do so in half of all postures are taken for built so"
+        found = self._found(distance)
+        if float((distance > found).mean()) >= _LEFT:
+            return found
+        self._level = float(np.quantile(self._met(few), _LEFT))
+        self.built_so = "to meet in as much of their surfaces as in the least 30 % is built so"
+        return self._found(distance)
+
+    def _found(self, distance: FloatArray) -> float:
+        """The largest distance with what counts of the surfaces; distance (N,) of the capsules."""
         order = np.argsort(-distance, kind="stable")
         order = order[distance[order] <= 0.0]
         tried = order[:: max(1, len(order) // _TRIED)]
@@ -240,6 +253,8 @@ class _Meeting:
             near = np.clip(near, self._q.min(axis=0), self._q.max(axis=0))
             apart = self._distances(near)
             better = (apart > distance.max()) & (apart <= 0.0)
+            if not better.any():
+                continue
             near = near[better][:_LOOKED_AT]
             met = self._meet(near)
             q = np.concatenate([q, near[met]])
@@ -253,12 +268,21 @@ class _Meeting:
         return np.asarray(self._model.distances(q)[:, 0])
 
     def _meet(self, q: FloatArray) -> BoolArray:
-        """Whether the surfaces meet or may meet, by the radii of their points (N,)."""
+        """Whether the surfaces meet or may meet, by the radii of their points, in more than what is
+        built so (N,).
+        """
+        return self._met(q) > self._level
+
+    def _met(self, q: FloatArray) -> FloatArray:
+        """How many points that count may meet the other surface (N,)."""
         sides = (0, 1) if self.built_so else (0,)
-        result = np.zeros(len(q), dtype=bool)
-        for k, poses in enumerate(self._relative(q)):
-            result[k] = any(len(self._meeting(side, poses[side])) for side in sides)
-        return result
+        return np.array(
+            [
+                sum(len(self._meeting(side, poses[side])) for side in sides)
+                for poses in self._relative(q)
+            ],
+            dtype=np.float64,
+        )
 
     def _relative(self, q: FloatArray) -> FloatArray:
         """Poses (N, 2, 4, 4) of each link in the other one."""
@@ -281,11 +305,10 @@ class _Meeting:
         far, _ = self._trees[1 - side].query(points.at[inside], distance_upper_bound=limit)
         return np.asarray(chosen[inside][far <= own + most])
 
-    def _leave_out_what_is_built_so(self, q: FloatArray) -> None:
+    def _meetings(self, q: FloatArray) -> list[FloatArray]:
+        """In how many postures each point of both sides may meet the other one."""
         counts = [np.zeros(len(each.at)) for each in self._sides]
         for poses in self._relative(q):
             for side in (0, 1):
                 counts[side][self._meeting(side, poses[side])] += 1.0
-        self._counted = tuple(each < _BUILT_SO * len(q) for each in counts)
-        left = sum(int(each.sum()) for each in self._counted)
-        self.built_so = 1.0 - left / sum(len(each) for each in self._counted)
+        return counts
