@@ -33,6 +33,10 @@ ROOM = 0.002
 _DEEPEST = 0.1  # of the postures of a pair that is built so, which are not allowed
 _BUILT_SO = 0.5  # of the postures in which points that meet do so by construction
 _LEFT = 0.3  # of the postures that a pair must leave
+LEAST_LEFT = 0.1
+"""Share of postures that two links must leave to be told apart by their capsules."""
+_WIDEST = 0.4  # of the postures, of links that can't be told apart
+_WIDE = "that leaves no posture: lowered to what the widest 40 % keep"
 _VOXELS = 60  # along a part: one point stands for the surface in each
 _LOOKED_AT = 48  # postures, for what is built so and in a round around those that meet
 _TRIED = 160  # postures in which capsules overlap
@@ -68,14 +72,25 @@ def pairs_of(
     distance = model.distances(q)
     named = {capsule.name: capsule for capsule in capsules}
     surfaces = _Surfaces(arm, bodies)
-    reduced = []
+    groups: dict[tuple[int, int], list[int]] = {}
     for z, (_, first, second) in enumerate(model.pairs):
-        if float((distance[:, z] <= SAFETY).mean()) <= NEAR:
-            continue
-        one, other = sorted((named[first], named[second]), key=lambda each: each.link)
-        meeting = _Meeting(chain, one, other, surfaces, q)
-        own = _own_distance(distance[:, z], meeting)
-        reduced.append(ReducedDistance(first, second, *own))
+        if float((distance[:, z] <= SAFETY).mean()) > NEAR:
+            links = sorted((named[first].link, named[second].link))
+            groups.setdefault((links[0], links[1]), []).append(z)
+    reduced = []
+    for near in groups.values():
+        own = []
+        for z in near:
+            pair = (named[name] for name in model.pairs[z][1:])
+            one, other = sorted(pair, key=lambda each: each.link)
+            own.append(_own_distance(distance[:, z], _Meeting(chain, one, other, surfaces, q)))
+        room = (distance[:, near] - [kept for kept, _ in own]).min(axis=1)
+        lower = min(0.0, float(np.quantile(room, 1.0 - _WIDEST)))
+        if float((room > 0.0).mean()) < LEAST_LEFT:
+            own = [(kept + lower, f"{reason}; {_WIDE}") for kept, reason in own]
+        reduced += [
+            ReducedDistance(*model.pairs[z][1:], *each) for z, each in zip(near, own, strict=True)
+        ]
     return Pairs(tuple(far), tuple(reduced))
 
 
@@ -206,7 +221,6 @@ class _Meeting:
         self._sides = (surfaces.within(one), surfaces.within(other))
         self._counted = tuple(np.ones(len(each.at), dtype=bool) for each in self._sides)
         self._trees: tuple[cKDTree, ...] = ()
-        self._level = 0.0
         self.built_so = ""
 
     def largest_distance(self) -> float:
@@ -224,11 +238,6 @@ class _Meeting:
         counts = self._meetings(few)
         self._counted = tuple(each < _BUILT_SO * len(few) for each in counts)
         self.built_so = "places that do so in half of all postures are taken for built so"
-        found = self._found(distance)
-        if float((distance > found).mean()) >= _LEFT:
-            return found
-        self._level = float(np.quantile(self._met(few), _LEFT))
-        self.built_so = "to meet in as much of their surfaces as in the least 30 % is built so"
         return self._found(distance)
 
     def _found(self, distance: FloatArray) -> float:
@@ -268,21 +277,12 @@ class _Meeting:
         return np.asarray(self._model.distances(q)[:, 0])
 
     def _meet(self, q: FloatArray) -> BoolArray:
-        """Whether the surfaces meet or may meet, by the radii of their points, in more than what is
-        built so (N,).
-        """
-        return self._met(q) > self._level
-
-    def _met(self, q: FloatArray) -> FloatArray:
-        """How many points that count may meet the other surface (N,)."""
+        """Whether the surfaces meet or may meet, by the radii of their points (N,)."""
         sides = (0, 1) if self.built_so else (0,)
-        return np.array(
-            [
-                sum(len(self._meeting(side, poses[side])) for side in sides)
-                for poses in self._relative(q)
-            ],
-            dtype=np.float64,
-        )
+        result = np.zeros(len(q), dtype=bool)
+        for k, poses in enumerate(self._relative(q)):
+            result[k] = any(len(self._meeting(side, poses[side])) for side in sides)
+        return result
 
     def _relative(self, q: FloatArray) -> FloatArray:
         """Poses (N, 2, 4, 4) of each link in the other one."""
