@@ -103,6 +103,16 @@ def test_what_makes_no_sense_is_named_with_its_line(
     assert sentence in str(caught.value)
 
 
+def test_a_row_that_is_too_short_is_held_against_the_first_where_there_are_no_headings(
+    tmp_path: Path,
+) -> None:
+    mapping = read_mapping(
+        written(tmp_path, "format: ir_trace/1\ncolumns: {time: 1, power: 2}\n", "map.yaml")
+    )
+    with pytest.raises(RecorderError, match=":3: has 1 values, line 1, the first, has 2"):
+        read_traces(written(tmp_path, "0,1\n1,1\n2\n3,1\n"), mapping)
+
+
 def test_rows_said_twice_and_a_line_that_was_cut_are_left_out_with_a_sentence(
     tmp_path: Path,
 ) -> None:

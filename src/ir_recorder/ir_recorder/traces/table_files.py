@@ -115,7 +115,9 @@ class _Reader:
         )
         self._headings = [each.strip() for each in next(self._split([header]), [])]
         where = f"{path}:{self._begin}"
+        self._expected = f"the header names {len(self._headings)} columns"
         if _is_row(self._headings):
+            self._expected = f"line {self._begin}, the first, has {len(self._headings)}"
             self._file = chain([header], file)
             self._begin -= 1
             self._headings = _numbers_of(self._headings, where, mapping)
@@ -217,8 +219,7 @@ class _Reader:
         for k, (line, row) in enumerate(rows):
             if len(row) != len(self._headings):
                 raise RecorderError(
-                    f"{self._path}:{line}: has {len(row)} values, "
-                    f"the header names {len(self._headings)} columns"
+                    f"{self._path}:{line}: has {len(row)} values, {self._expected}"
                 )
             for j, name in enumerate(names):
                 place, scale = self._places[name]
