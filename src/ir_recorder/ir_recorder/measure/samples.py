@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from ir_description import Load
 from ir_msgs_py.modes import REST_MODES, Mode
@@ -85,19 +87,22 @@ class Samples:
         """Values (M, ...) as `watts` would show them: means between two readings of the meter."""
         if self.readings is None or len(self) == 0:
             return values
+        within = self._between_readings
+        columns = values.reshape(len(self), -1)
+        means = (within @ columns) / np.asarray(within.sum(axis=1))
+        return np.asarray(within.T @ means).reshape(values.shape)
+
+    @cached_property
+    def _between_readings(self) -> csr_matrix:
+        """The share of each sample (columns) that lies between two readings (rows)."""
+        assert self.readings is not None  # asked before
         edges = self.time[0] + self.step * (np.arange(len(self) + 1) - 0.5)
         inside = self.readings[(self.readings > edges[0]) & (self.readings < edges[-1])]
-        times = np.concatenate([edges[:1], inside, edges[-1:]])
-        total = np.concatenate([np.zeros_like(values[:1]), np.cumsum(values, axis=0)])
-        return np.diff(_linear(edges, times, _linear(times, edges, total)), axis=0)
-
-
-def _linear(at: FloatArray, times: FloatArray, values: FloatArray) -> FloatArray:
-    """Values (K, ...) at rising times (K,), linear between them, at other times (L,) within."""
-    k = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
-    share = (at - times[k]) / (times[k + 1] - times[k])
-    share = share.reshape(-1, *[1] * (values.ndim - 1))
-    return np.asarray((1.0 - share) * values[k] + share * values[k + 1])
+        cuts = np.unique(np.concatenate([edges, inside]))
+        rows = np.searchsorted(inside, cuts[:-1], side="right")
+        samples = np.searchsorted(edges[1:-1], cuts[:-1], side="right")
+        shape = (len(inside) + 1, len(self))
+        return csr_matrix((np.diff(cuts) / self.step, (rows, samples)), shape)
 
 
 def movements(
