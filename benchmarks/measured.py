@@ -31,6 +31,7 @@ from ir_description import (
     centre_deviations,
     data_sheet_of,
     interval_over,
+    load_robot,
 )
 from ir_recorder.errors import RecorderError
 from ir_recorder.fit import (
@@ -54,6 +55,13 @@ UR3E = "ur3e_rad.csv"
 KR300 = "kr300_r2500_ultra_{}.csv"
 RUNS = "ABC"
 TX40 = ("pos_read_data.csv", "curr_data.csv", "tx40_mdh_modified.urdf")
+UR10E = (
+    "ur-20_02_10-30sec_12harm.csv",
+    "ur-20_02_12-40sec_12harm.csv",
+    "ur-20_02_19_14harm50sec.csv",
+    "ur-20_02_19_15harm50sec.csv",
+    "ur-20_01_17-ptp_10_points.csv",
+)
 TX40_STEP = 2e-4  # s
 TX40_THINNED = 10  # rows averaged to one: 2 ms
 PAYLOAD = 150.0  # kg: of the KR 300's recordings, not stated there
@@ -154,6 +162,10 @@ def _sets(folder: Path) -> Iterator[tuple[list[Row], list[Claim]]]:
         yield _tx40(folder)
     else:
         print(f"left out: {', '.join(TX40)} are not in {folder}")
+    if all((folder / name).is_file() for name in UR10E):
+        yield _ur10e(folder)
+    else:
+        print(f"left out: {', '.join(UR10E)} are not in {folder}")
 
 
 def _strangers(count: int) -> tuple[list[dict[str, Any]], list[Claim], list[bool]]:
@@ -369,6 +381,38 @@ def _tx40(folder: Path) -> tuple[list[Row], list[Claim]]:
         rows.append(_split(known, whole, f"TX40, {what}", "two thirds to the last"))
     name = "TX40: work of the motors in the last third"
     return rows, [at_most(name, abs(rows[0].fit), "%", 1.5)]
+
+
+def _ur10e(folder: Path) -> tuple[list[Row], list[Claim]]:
+    """Work of a UR10e's motors by their currents: each recording by a fit on the others."""
+    robot = load_robot("ur10e")
+    model, prior = _model(robot)
+    runs = []
+    for name in UR10E:
+        table = np.loadtxt(folder / name, delimiter=",")
+        columns = {}
+        for k, joint in enumerate(robot.joint_names):
+            columns[joint] = table[:, 1 + k].copy()
+            columns[f"{joint}_velocity"] = table[:, 7 + k].copy()
+            columns[f"{joint}_current"] = table[:, 13 + k].copy()
+        rising = np.concatenate([[True], np.diff(table[:, 0]) > 0.0])
+        kept = {key: each[rising] for key, each in columns.items()}
+        trace = Trace(name, table[rising, 0].copy(), kept)
+        runs.append(_samples(trace, robot, prior, (), metered=False))
+    estimate = Estimate(runs, list(UR10E), model, prior, motors=True)
+    estimate.result("ur10e")
+    found = left_out(estimate)
+    median, largest = (
+        Row("UR10e, 5 recordings", name, *(own(found, m) for m in METHODS))
+        for name, own in (
+            ("work, median %", lambda rows, m: 100.0 * median_error(rows, m)),
+            ("work, largest %", _largest),
+        )
+    )
+    name = "UR10e: work of the motors of a recording left out, median"
+    return [median, largest], [
+        at_most(f"{name}, beside the data sheet", median.fit / median.sheet, "", 1.0),
+    ]
 
 
 def _uncoupled(robot: RobotModel) -> RobotModel:

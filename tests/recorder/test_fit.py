@@ -26,7 +26,7 @@ from ir_description import (
 )
 from ir_recorder.errors import RecorderError
 from ir_recorder.fit import Fit, Source, fit, fit_data, sentences
-from ir_recorder.fit.data import check_range, check_readings
+from ir_recorder.fit.data import check_range, check_readings, check_speed
 from ir_recorder.fit.estimate import by_window
 from ir_recorder.measure import PowerModel, Samples, movements
 from ir_recorder.traces import Trace
@@ -219,6 +219,22 @@ def test_a_meter_that_no_parameters_explain_is_refused(factor: float) -> None:
     samples = metered(programme(4, 4, 0), PRIOR.drawn(4), 4)
     with pytest.raises(RecorderError, match="no parameters explain the meter"):
         fit(replace(samples, watts=factor * samples.watts), MODEL, PRIOR)
+
+
+@pytest.mark.parametrize("joint", range(6))
+@pytest.mark.parametrize("factor", [3.0, np.degrees(1.0), 1000.0])
+def test_speeds_that_no_axis_reaches_are_refused_and_a_spike_is_not(
+    joint: int, factor: float
+) -> None:
+    robot = CELL.robot
+    rng = np.random.default_rng(joint)
+    qd = robot.velocity_max * rng.uniform(-1.1, 1.1, (5000, 6))
+    qd[10] = np.nan  # where nobody knows it
+    qd[20] *= 5.0  # a spike of the differentiation
+    check_speed("run.csv", robot, qd)
+    qd[:, joint] *= factor
+    with pytest.raises(RecorderError, match=f"{robot.joint_names[joint]} moves at .*unit"):
+        check_speed("run.csv", robot, qd)
 
 
 def test_degrees_without_their_unit_and_other_robots_are_refused() -> None:

@@ -46,6 +46,7 @@ from ir_recorder.fit import (
     parameter_rows,
     recommendation,
     source_cell,
+    undecided,
     write_fit_picture,
 )
 from ir_recorder.fit import sentences as fit_sentences
@@ -308,7 +309,13 @@ def run_fit(arguments: argparse.Namespace) -> int:
     doubted = doubts(estimate, found)
     begun = "the data sheet" if prior.name == DATA_SHEET else prior.name
     advised = recommendation(unseen, doubted=bool(doubted), begun=begun)
-    said = (*data.notes, *fit_sentences(found, begun), *doubted, advised)
+    said = (
+        *data.notes,
+        *fit_sentences(found, begun),
+        *undecided(estimate),
+        *doubted,
+        advised,
+    )
     rows = parameter_rows(found, prior)
     if arguments.json:
         listed = [asdict(each) for each in found.movements]

@@ -180,6 +180,25 @@ def check_range(source: str, robot: RobotModel, q: FloatArray) -> None:
         )
 
 
+_FASTER = 1.2  # times full speed: controllers let axes overshoot a little
+_SELDOM_FASTER = 0.001  # share of the samples: spikes of differentiated positions
+
+
+def check_speed(source: str, robot: RobotModel, qd: FloatArray) -> None:
+    """RecorderError where speeds (M, n) [rad/s] are beyond what the robot's axes can reach."""
+    known = qd[np.isfinite(qd).all(axis=1)]
+    if not len(known):
+        return
+    fastest = np.quantile(np.abs(known), 1.0 - _SELDOM_FASTER, axis=0)
+    j = int((fastest / robot.velocity_max).argmax())
+    if fastest[j] > _FASTER * robot.velocity_max[j]:
+        raise RecorderError(
+            f"{source}: {robot.joint_names[j]} moves at {fastest[j]:.3g} rad/s, {robot.name} "
+            f"reaches {robot.velocity_max[j]:.3g} rad/s. Are the units of time and position right "
+            "(ms or s, degrees or rad), is it the column of this joint, and is it this robot?"
+        )
+
+
 # What a fit is made from: a recording, or traces of joints and of a power meter with its own
 # clock.
 
@@ -314,6 +333,7 @@ def _run(
         check_readings(meter)
     notes += _gaps(joints)
     samples = samples_of(joints, meter, names, prior.modes, runs)
+    check_speed(joints.source, cell.robot, samples.qd)
     if meter is not None and by != BY[1]:
         check_unit(samples.watts, cell.robot, meter.source)
     return samples, notes, added

@@ -5,7 +5,8 @@ taken for each other. Such data fit badly, but fit; so it is said.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -229,23 +230,73 @@ def _strain(estimate: Estimate, found: Fit, factor: float) -> float:
 # the two joints exchanged as well) are held against the same power. The likeliest such readings,
 # and the columns as given, are then fitted to a part of the recording, by the noise of the meter
 # alone: columns of a wrist that are exchanged leave errors that a widened noise would swallow.
+# Readings that explain the power about as well as the columns as given are no doubt, but said: the
+# watts do not tell them apart.
 
 _SECONDS = 40.0  # of a recording that other columns are tried on
 _STRIDE = 5.0  # s between parts that are looked at
-_LIKELIEST = 3  # readings that are fitted
+_LIKELIEST = 5  # readings that are fitted
 _ODDS = 12.0  # by how much twice the log-likelihood has to rise, with noise as wide as the fit's
 _BETTER = 0.5  # or: of the squares that are left as given, whatever they count
+_AS_WELL = 1.1  # of the squares that are left as given: with at most so many it is no worse
+
+
+@dataclass(frozen=True)
+class _Columns:
+    """Of a recording: the squares that are left by its columns as given, how many a reading must
+    leave to be better, and those that the likeliest readings leave, by what was changed in them.
+    """
+
+    name: str
+    as_given: float
+    better: float
+    changed: tuple[tuple[str, float], ...]
+
+
+def undecided(estimate: Estimate) -> tuple[str, ...]:
+    """A sentence on columns of joints that the power does not tell apart, after `result`."""
+    columns = _columns(estimate)
+    if columns is None:
+        return ()
+    alike = [
+        what
+        for what, left in columns.changed
+        if columns.better <= left <= _AS_WELL * columns.as_given
+    ]
+    if not alike:
+        return ()
+    return (
+        f"{columns.name}: with {', or with '.join(alike)}, the power would be explained as well: "
+        "the watts do not prove these columns; move each of these joints alone and see that its "
+        "own column follows, with the right sign",
+    )
 
 
 def _of_columns(estimate: Estimate) -> Iterator[str]:
     """Two columns of joints that explain the power better the other way round, or one that does
     with its sign changed.
     """
+    columns = _columns(estimate)
+    if columns is None:
+        return
+    what, left = min(columns.changed, key=lambda each: each[1])
+    if left < columns.better:
+        yield (
+            f"{columns.name}: with {what} the power is explained better "
+            f"({left / columns.as_given:.2f} of the squares are left): look at the mapping"
+        )
+
+
+@lru_cache(maxsize=1)  # of the estimate that was asked for last: doubts and what is undecided
+def _columns(estimate: Estimate) -> _Columns | None:
+    """What other readings of the columns leave; None where there is too little to try them on."""
+    if estimate.meter is None:
+        return None
     run = max(estimate.runs, key=lambda each: len(each.samples))
     part = _liveliest(run.samples)
     usable = part.known & np.isfinite(part.watts)
     if np.count_nonzero(usable & part.moving) < _FEWEST or usable.mean() < _USABLE:
-        return
+        return None
     joints = estimate.prior.joints
     n = len(joints)
     given = np.arange(n)
@@ -260,15 +311,10 @@ def _of_columns(estimate: Estimate) -> Iterator[str]:
         readings.append((f"the columns of {joints[a]} and {joints[b]} swapped", order, up))
     tried = [_Reading(estimate, part, order, sign) for _, order, sign in readings]
     likeliest = np.argsort([each.cost() for each in tried], kind="stable")[:_LIKELIEST]
-    fitted = {readings[k][0]: tried[k].fitted() for k in likeliest.tolist()}
-    what = min(fitted, key=lambda each: fitted[each])
     as_given = _Reading(estimate, part, given, up).fitted()
     sure = as_given - _ODDS * estimate.widened_by()
-    if fitted[what] < max(sure, _BETTER * as_given):
-        yield (
-            f"{run.name}: with {what} the power is explained better "
-            f"({fitted[what] / as_given:.2f} of the squares are left): look at the mapping"
-        )
+    changed = tuple((readings[k][0], tried[k].fitted()) for k in likeliest.tolist())
+    return _Columns(run.name, as_given, max(sure, _BETTER * as_given), changed)
 
 
 def _liveliest(samples: Samples) -> Samples:
