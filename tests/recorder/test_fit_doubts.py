@@ -17,7 +17,7 @@ from ir_description import (
 )
 from ir_description.library import power_parameters_of
 from ir_recorder.errors import RecorderError
-from ir_recorder.fit import Estimate, doubts, fit, recommendation, result
+from ir_recorder.fit import Estimate, doubts, fit, recommendation, result, undecided
 from ir_recorder.measure import PowerModel, Samples
 
 ROBOT = load_robot("kr6_r900_2")
@@ -134,6 +134,14 @@ def test_columns_that_were_taken_for_each_other_are_named() -> None:
     )
     joints = ROBOT.joint_names
     assert f"the columns of {joints[1]} and {joints[2]} swapped" in doubted(swapped)
+
+
+def test_columns_of_a_wrist_that_are_exchanged_are_doubted_or_said_to_be_undecided() -> None:
+    model, prior = model_of(ROBOT)
+    swapped = with_columns(drawn_meter(1), [0, 1, 2, 4, 3, 5], np.ones(6))
+    estimate = Estimate([swapped], ["run"], model, prior)
+    said = " ".join((*doubts(estimate, result(estimate, "x")), *undecided(estimate)))
+    assert f"the columns of {ROBOT.joint_names[3]} and {ROBOT.joint_names[4]} swapped" in said
 
 
 def test_power_with_the_wrong_sign_is_refused() -> None:

@@ -311,7 +311,10 @@ def _run(
         mapping = source.meter_mapping or TraceMapping()
         outer = _metered(read_traces(source.meter, mapping, cell.robot.joint_names))
         if outer is None:
-            raise RecorderError(f"{source.meter}: there is neither a column power nor energy")
+            raise RecorderError(
+                f"{source.meter}: there is neither a column power nor energy: head it power_W, "
+                "power_kW or energy_Wh, or say in a mapping (--meter-mapping) which column it is"
+            )
         if np.isnan(mapping.clock_offset):
             offset, what = _offset(joints, meter, outer, prior, model, runs)
             notes.append(
