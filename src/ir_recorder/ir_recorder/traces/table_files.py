@@ -218,9 +218,7 @@ class _Reader:
         values = np.empty((len(rows), len(names)))
         for k, (line, row) in enumerate(rows):
             if len(row) != len(self._headings):
-                raise RecorderError(
-                    f"{self._path}:{line}: has {len(row)} values, {self._expected}"
-                )
+                raise RecorderError(f"{self._path}:{line}: has {len(row)} values, {self._expected}")
             for j, name in enumerate(names):
                 place, scale = self._places[name]
                 values[k, j] = scale * self._number(row[place], name, line)
