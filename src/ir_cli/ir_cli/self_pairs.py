@@ -165,9 +165,10 @@ class _Surfaces:
                 half = 0.5 / 19.0 * float(np.linalg.norm(p1 - p0))
                 radii.append(np.full(20, radius + half + wider))
             else:
-                at, radius = _voxels(_in_capsule(body.triangles, capsule, size / _VOXELS), size)
+                near = _in_capsule(body.triangles, capsule, size / _VOXELS)
+                at, around = _voxels(near, size)
                 points.append(at)
-                radii.append(radius + wider)
+                radii.append(around + wider)
         return _Points(np.concatenate(points), np.concatenate(radii))
 
 

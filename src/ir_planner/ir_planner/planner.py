@@ -17,7 +17,7 @@ from typing import TypedDict, Unpack
 
 import numpy as np
 
-from ir_description import Cell, CellPath, PowerData, ToolTilt, cell_hash, is_path
+from ir_description import VIA_TOLERANCE, Cell, CellPath, PowerData, ToolTilt, cell_hash, is_path
 from ir_kernels import InputError
 from ir_kernels.data import pose as rigid_pose
 from ir_msgs_py.cartesian import CartesianPath
@@ -91,7 +91,6 @@ from ir_planner.settings import PlannerSettings
 from ir_planner.state_queries import StatesCheck, asked_state, asked_states
 from ir_planner.store import StoredProgram, program_store, trajectory_store
 from ir_planner.trajectories import (
-    VIA_TOLERANCE,
     OptimizationPlan,
     Reference,
     Via,

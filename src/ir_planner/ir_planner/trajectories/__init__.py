@@ -2,11 +2,10 @@
 
 from ir_planner.trajectories.optimization import OptimizationPlan, optimize_trajectory
 from ir_planner.trajectories.through_points import POINTS_MAX, Reference, plan_through
-from ir_planner.trajectories.via import VIA_TOLERANCE, Via, plan_via, search_via
+from ir_planner.trajectories.via import Via, plan_via, search_via
 
 __all__ = [
     "POINTS_MAX",
-    "VIA_TOLERANCE",
     "OptimizationPlan",
     "Reference",
     "Via",

@@ -21,7 +21,7 @@ from ir_recorder.analysis.checks import Finding, Tolerances, at_least, at_most, 
 from ir_recorder.analysis.loads import held_part
 from ir_recorder.analysis.results import Analysis, StepResult
 from ir_recorder.analysis.tending import Span
-from ir_values.arrays import FloatArray
+from ir_values.arrays import BoolArray, FloatArray
 
 _ROWS = 2000  # instants that are looked at together
 _STAMPS = 0.05  # s: readings of two robots that come every 10 ms, and the answers of their nodes
@@ -82,7 +82,7 @@ class _Arm:
             tuple(loads),
         )
 
-    def segments(self, times: FloatArray) -> list[tuple[str, float, FloatArray, FloatArray]]:
+    def segments(self, times: FloatArray) -> list[tuple[str, float, FloatArray, BoolArray]]:
         """Name and radius of each capsule, (N, 2, 3) its ends, and (N,) whether it is there."""
         cell = self.analysis.cell
         assert cell is not None
