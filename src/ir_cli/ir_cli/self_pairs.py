@@ -39,7 +39,8 @@ _WIDEST = 0.4  # of the postures, of links that can't be told apart
 _WIDE = "that leaves no posture: lowered to what the widest 40 % keep"
 _VOXELS = 60  # along a part: one point stands for the surface in each
 _LOOKED_AT = 48  # postures, for what is built so and in a round around those that meet
-_TRIED = 160  # postures in which capsules overlap
+_TRIED = 500  # postures in which capsules overlap, but by no more than usual
+_DEEPER = 60  # in which they overlap by more
 _FROM = 8  # postures that meet, around which others are looked at
 _AROUND = 24
 _STEPS = (0.06, 0.03, 0.015, 0.008)  # of the range of each joint
@@ -101,7 +102,7 @@ def _own_distance(distance: FloatArray, meeting: _Meeting) -> tuple[float, str]:
     reason = f"nearer than {1e3 * SAFETY:g} mm in {near:.0f} % of {len(distance)} postures"
     if usual >= 0.0:
         return usual, reason
-    least = meeting.largest_distance()
+    least = meeting.largest_distance(usual)
     if meeting.built_so:
         reason += f"; the bodies of the URDF meet in most postures: {meeting.built_so}"
     if least <= usual:
@@ -160,10 +161,10 @@ class _Surfaces:
         for body in self._bodies[capsule.link]:
             wider = body.beside + self._rounding
             if body.exact is not None:
-                p0, p1, radius, _ = body.exact
+                p0, p1, ball, _ = body.exact
                 points.append(np.linspace(p0, p1, 20))
                 half = 0.5 / 19.0 * float(np.linalg.norm(p1 - p0))
-                radii.append(np.full(20, radius + half + wider))
+                radii.append(np.full(20, ball + half + wider))
             else:
                 near = _in_capsule(body.triangles, capsule, size / _VOXELS)
                 at, around = _voxels(near, size)
@@ -204,6 +205,11 @@ def _voxels(triangles: FloatArray, size: float) -> tuple[FloatArray, FloatArray]
     return at, radius
 
 
+def _thinned(rows: IntArray, most: int) -> IntArray:
+    """Rows, evenly taken, not many more than `most`."""
+    return rows[:: max(1, len(rows) // most)]
+
+
 class _Meeting:
     """Postures in which the bodies in two capsules meet, of a link and of one beyond the next.
 
@@ -224,28 +230,30 @@ class _Meeting:
         self._trees: tuple[cKDTree, ...] = ()
         self.built_so = ""
 
-    def largest_distance(self) -> float:
+    def largest_distance(self, usual: float) -> float:
         """What the capsules are apart at most [m] where the bodies meet, in all postures that were
-        looked at: -inf where they never do, 0 for capsules without bodies.
+        looked at, most of which keep `usual` [m]: -inf where they never do, 0 for capsules without
+        bodies.
         """
         if not all(len(each.at) for each in self._sides):
             return 0.0
         self._trees = tuple(cKDTree(each.at) for each in self._sides)
         few = self._q[:_LOOKED_AT]
         distance = self._distances(self._q)
-        found = self._found(distance)
+        found = self._found(distance, usual)
         if float((distance > found).mean()) >= _LEFT:
             return found
         counts = self._meetings(few)
         self._counted = tuple(each < _BUILT_SO * len(few) for each in counts)
         self.built_so = "places that do so in half of all postures are taken for built so"
-        return self._found(distance)
+        return self._found(distance, usual)
 
-    def _found(self, distance: FloatArray) -> float:
+    def _found(self, distance: FloatArray, usual: float) -> float:
         """The largest distance with what counts of the surfaces; distance (N,) of the capsules."""
         order = np.argsort(-distance, kind="stable")
-        order = order[distance[order] <= 0.0]
-        tried = order[:: max(1, len(order) // _TRIED)]
+        kept = order[(distance[order] <= 0.0) & (distance[order] > usual)]
+        deeper = order[distance[order] <= usual]
+        tried = np.concatenate([_thinned(kept, _TRIED), _thinned(deeper, _DEEPER)])
         met = self._meet(self._q[tried])
         if not met.any():
             return -np.inf
