@@ -53,6 +53,7 @@ class Judge:
         link = {self.model.getJointId(name): k + 1 for k, name in enumerate(names)}
         self.bodies: list[list[Any]] = [[] for _ in range(7)]
         for shape in self.shapes.geometryObjects:
+            _check_meshes(shape.meshPath)
             self.bodies[link.get(shape.parentJoint, 0)].append(shape)
 
     def contacts(self, q: np.ndarray, one: int, other: int) -> np.ndarray:
@@ -77,6 +78,16 @@ class Judge:
                 joints = (self.data.oMi[each.parentJoint] for each in (a, b))
                 found.append([joint.actInv(point) for joint in joints])
         return np.array(found).reshape(-1, 2, 3)
+
+
+def _check_meshes(path: str) -> None:
+    """Raise InputError for a Collada file that Pinocchio 4.1 reads wrongly: the corners of its
+    second mesh are taken from the first one.
+    """
+    if path.lower().endswith(".dae"):
+        text = Path(path).read_text(encoding="utf-8", errors="replace")
+        if text.count("<geometry ") > 1:
+            raise InputError(f"{path} has several meshes: Pinocchio mixes up their corners")
 
 
 def beyond(contacts: list[np.ndarray], allowed: np.ndarray) -> float:
@@ -143,7 +154,7 @@ def main() -> int:
                 RobotSource(path, payload=5.0, packages=given.packages), given.postures
             )
         except InputError as error:
-            fine, line = True, f"not made: {error}"
+            fine, line = True, f"not judged: {error}"
         print(f"{path.name}: {line}", flush=True)
         good &= fine
     return 0 if good else 1
