@@ -28,7 +28,7 @@ setup-tests:      ## the same, and what checks, tests and benchmarks need
 demo: setup       ## plan, drive, record and explain the demonstration cell
 	@$(BIN)/ir demo $(ARGS)
 
-test: setup-tests ## every test that takes seconds to a few minutes; about 8 minutes on two quiet cores
+test: setup-tests ## every test that takes seconds to a few minutes; it says how long all take
 	@$(TESTS) -m 'not long' $(ARGS)
 
 test-long: setup-tests ## every test, also those that run for minutes; then sanitizers, processors and versions
