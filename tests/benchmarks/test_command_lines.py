@@ -76,6 +76,7 @@ def test_every_benchmark_has_the_options(script: str, help_of: dict[str, list[An
     assert {option for option in OTHERS.get(script, OPTIONS) if option not in shown} == set()
 
 
+@pytest.mark.long
 def test_a_quick_run_prints_its_claims_and_writes_them(tmp_path: Path) -> None:
     file = tmp_path / "new" / "standby.json"
     printed = ran("standby", "--quick", "--cell", "open", "--seeds", "1", "--json", str(file))

@@ -75,6 +75,7 @@ def test_waves_are_at_rest_at_their_ends_and_agree_with_their_derivatives(points
     assert np.abs(numeric - wave.sample(at).qd).max() < 1e-4
 
 
+@pytest.mark.long
 def test_a_tiny_run_prints_exponents_and_draws(tmp_path: Path) -> None:
     file = tmp_path / "scaling.json"
     picture = tmp_path / "scaling.png"

@@ -22,7 +22,8 @@ OWN = {"ur10e": "first", "kr6_r900_2": "second"}  # whose URDF makes an own robo
         "kr6_bench",
         pytest.param("ur10e_bench", marks=pytest.mark.long),
         pytest.param("kr300_pallets", marks=pytest.mark.long),
-        *OWN,
+        pytest.param("ur10e", marks=pytest.mark.long),
+        "kr6_r900_2",
     ],
 )
 def cell(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> str:

@@ -58,6 +58,7 @@ def test_no_default_asks_it(site: Path) -> None:
     assert with_it == json.loads(run(site.parent, *words).stdout)
 
 
+@pytest.mark.long
 def test_it_passes_the_contract(site: Path) -> None:
     words = ("-m", "pytest", "-q", "-p", "no:cacheprovider", "--pyargs", "ir_planner.contract")
     answer = run(site, *words, "-k", NAME)
