@@ -7,8 +7,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from importlib.resources import files
+from typing import Any
 
+from ir_recorder.report.number_text import text
 from ir_recorder.report.page import asset
+from ir_recorder.report.tables import table
 
 BUTTON = (
     '<button id="theme" type="button" title="light or dark" aria-label="light or '
@@ -29,6 +32,27 @@ def page(kind: str, parts: Mapping[str, str], button: str = "") -> str:
         "main": _filled((own / "page.html").read_text("utf-8"), parts),
     }
     return _filled(shell, {"button": button, **parts, **inner})
+
+
+def settings_table(settings: Mapping[str, Any]) -> str:
+    """The settings of a study by their names in its file; those that are left empty are left
+    out.
+    """
+    rows = [
+        (f"<code>{text(name)}</code>", text(_words(value)))
+        for name, value in settings.items()
+        if value not in ("", (), [], {})
+    ]
+    return table(("setting", ">value"), rows, "Settings")
+
+
+def _words(value: Any) -> str:
+    """A value, a list or names with their values, as people read them."""
+    if isinstance(value, Mapping):
+        return "; ".join(f"{name}: {_words(one)}" for name, one in value.items())
+    if isinstance(value, list | tuple):
+        return ", ".join(map(_words, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _filled(template: str, parts: Mapping[str, str]) -> str:

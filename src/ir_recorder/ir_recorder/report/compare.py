@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ir_msgs_py.savings import ProgramSavings
-from ir_recorder.analysis import Analysis, Finding, summary
+from ir_recorder.analysis import Analysis, Finding
 from ir_recorder.analysis.flows import energy_flows
 from ir_recorder.analysis.production import (
     Production,
@@ -30,11 +30,11 @@ from ir_recorder.report.costs import (
     assumed_section,
     counted_with,
     payback,
-    yearly_end,
     yearly_money,
+    yearly_span,
 )
 from ir_recorder.report.files import write_output
-from ir_recorder.report.headline import plant_of
+from ir_recorder.report.headline import checked, plant_of
 from ir_recorder.report.number_text import (
     DASH,
     joules,
@@ -137,7 +137,7 @@ def _paid(compared: Sequence[Compared], names: Sequence[str], costs: Costs) -> s
     first = None if _apart([analysis for analysis, _ in compared]) else cycles[0]
     rows = [
         ("plant", *(text(plant_of(a)) for a, _ in compared)),
-        ("checks", *(text(summary(tuple(checks))[1]) for _, checks in compared)),
+        ("checks", *(text(checked(checks, a)[1]) for a, checks in compared)),
         ("a year of such cycles", *(_year(cycle, first, costs) for cycle in cycles)),
         ("saved by its plan, a year", *(_year_saved(cycle, costs) for cycle in cycles)),
         ("that is, of the whole line", *(_of_line(analysis, costs) for analysis, _ in compared)),
@@ -181,7 +181,7 @@ def _year_saved(cycle: Production | None, costs: Costs) -> str:
         payback(amount, costs),
     ]
     if price.high > price.low:
-        lines.insert(0, f"{yearly_end(price.low)} to {yearly_end(price.high)} {costs.currency}")
+        lines.insert(0, f"{yearly_span(price.low, price.high)} {costs.currency}")
     small = "".join(f"<small>{text(line)}</small>" for line in lines if line)
     return f"<b>{text(yearly_money(price.value, costs.currency))}</b>{small}"
 
@@ -221,10 +221,28 @@ def _measured_row(
     value: Callable[[Analysis], float],
     compared: Sequence[Compared],
 ) -> tuple[str, ...]:
-    values = [value(analysis) for analysis, _ in compared]
-    apart = _apart([analysis for analysis, _ in compared])
-    cells = (_against(each, values[0], unit, k == 0 or apart) for k, each in enumerate(values))
+    analyses = [analysis for analysis, _ in compared]
+    values = [value(analysis) for analysis in analyses]
+    short = [name in _WITH_PAUSES and _shortened(analysis) for analysis in analyses]
+    apart = _apart(analyses)
+    cells = (
+        _against(each, values[0], unit, k == 0 or apart or short[k] != short[0])
+        + (
+            "<small>pauses shortened</small>"
+            if short[k] and any(map(math.isfinite, values))
+            else ""
+        )
+        for k, each in enumerate(values)
+    )
     return (name, *cells)
+
+
+_WITH_PAUSES = ("program", "its time", "pauses")
+"""Rows that a run with shortened pauses makes smaller: no share of one at full length."""
+
+
+def _shortened(analysis: Analysis) -> bool:
+    return analysis.program is not None and analysis.program.unshortened is not None
 
 
 def _against(value: float, first: float, unit: Callable[[float], str], own: bool) -> str:
@@ -296,10 +314,15 @@ _VALUES: tuple[tuple[str, Callable[[float], str], Callable[[Analysis], float]], 
 
 
 def _points(analyses: Sequence[Analysis], names: Sequence[str]) -> list[Point]:
-    """Each program as it ran, and the common program where a recording names it."""
+    """Each program with its pauses at full length, driven or else planned."""
     points = []
     for analysis, name in zip(analyses, names, strict=True):
-        if analysis.program is not None and math.isfinite(analysis.program.whole.energy):
+        if _shortened(analysis):
+            cycle = production_of(analysis)
+            if cycle is not None:
+                origin = analysis.recording.origin
+                points.append(Point(name, cycle.seconds, cycle.energy, origin))
+        elif analysis.program is not None and math.isfinite(analysis.program.whole.energy):
             whole = analysis.program.whole
             points.append(Point(name, whole.seconds, whole.energy, analysis.recording.origin))
         elif (planned := planned_share(analysis.recording.planned)) is not None:
@@ -351,15 +374,21 @@ def _powers(analyses: Sequence[Analysis], names: Sequence[str]) -> dict[str, Jso
     meter's.
     """
     edges = np.linspace(0.0, _longest(analyses), _POINTS + 1)
-    value = np.zeros((_POINTS, len(analyses)))
-    for k, analysis in enumerate(analyses):
+    drawn = [k for k, analysis in enumerate(analyses) if _driven(analysis)]
+    value = np.zeros((_POINTS, len(drawn)))
+    for k, analysis in enumerate(analyses[one] for one in drawn):
         power = analysis.recording.power
-        if power is not None and analysis.steps and len(power.time) > 1:
+        if power is not None:
             spent = np.interp(edges + analysis.steps[0].step.start, power.time, power.energy)
             value[:, k] = np.diff(spent) / np.diff(edges)
     curves = Curves("power at the mains", "W", (edges[1:] + edges[:-1]) / 2.0, value)
     ends = [
-        analysis.program.whole.seconds if analysis.program is not None else 0.0
-        for analysis in analyses
+        analyses[k].program.whole.seconds if analyses[k].program is not None else 0.0 for k in drawn
     ]
-    return {**packed(curves), "names": list(names), "ends": ends}
+    return {**packed(curves), "names": [names[k] for k in drawn], "ends": ends}
+
+
+def _driven(analysis: Analysis) -> bool:
+    """Whether there is a curve of power to draw."""
+    power = analysis.recording.power
+    return power is not None and len(power.time) > 1 and bool(analysis.steps)

@@ -358,7 +358,7 @@ def money(value: float, currency: str) -> str:
     """
     if not math.isfinite(value):
         return DASH
-    if abs(value) >= 100.0:
+    if abs(value) >= _NO_CENTS:
         shown = f"{value:,.0f}".replace(",", " ")
     elif abs(value) >= 1.0:
         shown = f"{value:.2f}"
@@ -367,6 +367,7 @@ def money(value: float, currency: str) -> str:
     return f"{shown} {currency}"
 
 
+_NO_CENTS = 100.0  # of a currency: no cents from here on
 _NOTHING = 0.01  # of a currency, a year: nobody counts less
 _UNSEEN = 1e-4  # of a currency, a part or a shift
 
@@ -378,13 +379,21 @@ def yearly_money(value: float, currency: str) -> str:
     return money(value, currency)
 
 
-def yearly_end(value: float) -> str:
-    """An end of the interval of an amount of a year, without its currency."""
-    return money(value if abs(value) >= _NOTHING else 0.0, "").strip()
+def yearly_span(low: float, high: float) -> str:
+    """The ends of an amount of a year, without its currency."""
+    return _span_of_money(low, high, _NOTHING)
 
 
-def _end(value: float) -> str:
-    return money(value if abs(value) >= _UNSEEN else 0.0, "").strip()
+def _span_of_money(low: float, high: float, least: float) -> str:
+    """Two ends of one interval: both whole where one is shown so; 0 for one below `least`."""
+    whole = max(abs(low), abs(high)) >= _NO_CENTS
+
+    def show(value: float) -> str:
+        if whole:
+            return f"{value:,.0f}".replace(",", " ")
+        return money(value if abs(value) >= least else 0.0, "").strip()
+
+    return span_of(low, high, show)
 
 
 def payback(year: Amount, costs: Costs) -> str:
@@ -445,7 +454,9 @@ def _saving(where: str, saving: Saving, pace: float, costs: Costs) -> tuple[str,
     for count in counts:
         price = amount.times(count).of(costs.money)
         shown = _shown(price.value, year, costs.currency)
-        between = _between(price, _end) if abs(year) >= _NOTHING else ""
+        between = ""
+        if abs(year) >= _NOTHING and price.high > price.low:
+            between = f"<small>{text(_span_of_money(price.low, price.high, _UNSEEN))}</small>"
         cells.append(f"<b>{text(shown)}</b>{between}")
     cells[-1] += _yearly_cycles(pace, costs)
     return (f"{word} {where}", *cells)

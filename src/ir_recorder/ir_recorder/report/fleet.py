@@ -38,8 +38,8 @@ from ir_recorder.report.costs import (
     idle_saving,
     idle_sentence,
     payback,
-    yearly_end,
     yearly_money,
+    yearly_span,
 )
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import Tile, started
@@ -418,14 +418,14 @@ def _tiles(robots: Sequence[Robot], costs: Costs) -> str:
         Tile("costs a year", price, (f"{kilograms(costs.co2(yearly.value))} of CO2",)),
     ]
     if saved:
-        ends = [yearly_end(costs.money(end)) for end in (of_it.low, of_it.high)]
+        between = _money_between(of_it, costs)
         found.append(
             Tile(
                 f"{word} a year by plans, predicted",
                 yearly_money(costs.money(of_it.value), costs.currency),
                 (
                     kilowatt_hours(of_it.value),
-                    f"90 % interval {ends[0]} to {ends[1]} {costs.currency}",
+                    f"90 % interval {between} {costs.currency}",
                     of_it.doubt,
                     _paid(saved, costs),
                 ),
@@ -443,14 +443,13 @@ def _paid(saved: Sequence[Amount], costs: Costs) -> str:
 def _robots(robots: Sequence[Robot], costs: Costs) -> str:
     rows = [
         (
-            f"{text(robot.name)}<small>{text(robot.cell)}</small>"
+            f"{text(robot.name)}<small>{text(robot.cell)}</small><small>"
+            f"{text(', '.join(robot.origins))}, {counted(robot.recordings, 'recording')}</small>"
             + (f"<small>{DRIVES_ONLY}</small>" if robot.drives_only else ""),
-            text(", ".join(robot.origins)),
-            str(robot.recordings),
             *_yearly(robot.yearly, costs),
             _saved(robot.saved, costs),
-            seconds(robot.seconds),
-            text(kilowatt_hours(robot.joules / costs.parts_per_cycle)),
+            f"{seconds(robot.seconds)}<small>"
+            f"{text(kilowatt_hours(robot.joules / costs.parts_per_cycle))} a part</small>",
         )
         for robot in robots
     ]
@@ -459,25 +458,19 @@ def _robots(robots: Sequence[Robot], costs: Costs) -> str:
     if summed:
         rows.append(
             (
-                "<b>all</b>",
-                "",
-                str(sum(robot.recordings for robot in summed)),
+                "<b>all</b><small>"
+                f"{counted(sum(robot.recordings for robot in summed), 'recording')}</small>",
                 *_yearly(sum_of([robot.yearly for robot in summed]), costs),
                 _saved(sum_of(saved) if saved else None, costs),
-                "",
                 "",
             )
         )
     heads = (
         "robot",
-        "origin",
-        ">recordings",
-        ">energy a year",
         ">costs a year",
-        ">CO2 a year",
+        ">energy a year",
         ">saved a year, predicted",
-        ">cycle",
-        ">energy a part",
+        ">a cycle",
     )
     hint = (
         "A year is one cycle after the other in shifts, pauses at full length, without nights and "
@@ -606,12 +599,12 @@ def _shown(name: str) -> str:
     return name.replace("_", " ").lower() if name.isupper() else name
 
 
-def _yearly(amount: Amount, costs: Costs) -> tuple[str, str, str]:
-    """Energy, price and CO2 of a year, with their intervals."""
+def _yearly(amount: Amount, costs: Costs) -> tuple[str, str]:
+    """Price of a year, and its energy with interval and CO2."""
     return (
-        f"<b>{text(kilowatt_hours(amount.value))}</b>{_between(amount, kilowatt_hours)}",
-        text(yearly_money(costs.money(amount.value), costs.currency)),
-        text(kilograms(costs.co2(amount.value))),
+        f"<b>{text(yearly_money(costs.money(amount.value), costs.currency))}</b>",
+        f"<b>{text(kilowatt_hours(amount.value))}</b>{_between(amount, kilowatt_hours)}"
+        f"<small>{text(kilograms(costs.co2(amount.value)))} of CO2</small>",
     )
 
 
@@ -622,10 +615,14 @@ def _saved(amount: Amount | None, costs: Costs) -> str:
     price = yearly_money(costs.money(amount.value), costs.currency)
     doubt = f"<small>{amount.doubt}</small>" if amount.doubt else ""
     energy = f"{kilowatt_hours(amount.value)}{' more' if word == 'more' else ''}"
-    return (
-        f"<b>{text(price)}</b><small>{text(energy)}</small>"
-        f"{_between(amount, lambda value: yearly_end(costs.money(value)))}{doubt}"
-    )
+    between = ""
+    if amount.high > amount.low:
+        between = f"<small>{text(_money_between(amount, costs))} {text(costs.currency)}</small>"
+    return f"<b>{text(price)}</b><small>{text(energy)}</small>{between}{doubt}"
+
+
+def _money_between(amount: Amount, costs: Costs) -> str:
+    return yearly_span(costs.money(amount.low), costs.money(amount.high))
 
 
 def _between(amount: Amount, show: Callable[[float], str]) -> str:

@@ -32,10 +32,12 @@ from ir_recorder.report.costs import (
 )
 from ir_recorder.report.number_text import (
     DASH,
+    interval,
     joules,
     kilograms,
     kilowatt_hours,
     millimetres,
+    number,
     percent,
     seconds,
     share,
@@ -110,9 +112,38 @@ def source(analysis: Analysis) -> str:
     return f'<p class="source {style}"><b>{kind}</b> {text(what)}</p>'
 
 
-def verdict(checks: Sequence[Finding]) -> str:
+def checked(checks: Sequence[Finding], analysis: Analysis | None = None) -> tuple[Verdict, str]:
+    """The verdict over all checks in a sentence; of a plan that was not driven, what was proved."""
+    made = any(check.verdict is not Verdict.NOT_CHECKED for check in checks)
+    if analysis is not None and analysis.recording.only_planned and not made:
+        proved = "proved" if analysis.recording.planned_certified else "not proved"
+        return Verdict.NOT_CHECKED, f"plan {proved}; nothing driven to check"
+    return summary(tuple(checks))
+
+
+_NAMED = 3  # of failing checks, beside the verdict
+
+
+def failing(checks: Sequence[Finding]) -> str:
+    """The first checks that fail, each with what was found and what is allowed; "" without one."""
+    failed = [check for check in checks if check.verdict is Verdict.FAILS]
+    if not failed:
+        return ""
+    items = [
+        f"{check.name}: {number(check.measured, check.unit)}, allowed "
+        f"{interval(check.low, check.high, check.unit)}"
+        for check in failed[:_NAMED]
+    ]
+    if len(failed) > _NAMED:
+        items.append(f"{len(failed) - _NAMED} more below, at Checks")
+    listed = "".join(f"<li>{text(item)}</li>" for item in items)
+    head = "The check that fails" if len(failed) == 1 else "Checks that fail"
+    return f'<div class="problems"><b>{head}</b><ul>{listed}</ul></div>'
+
+
+def verdict(checks: Sequence[Finding], analysis: Analysis | None = None) -> str:
     """The verdict over all checks; green only where every check was made and holds."""
-    kind, sentence = summary(tuple(checks))
+    kind, sentence = checked(checks, analysis)
     words = sentence[0].upper() + sentence[1:]
     return f'<p class="verdict {_STYLES[kind]}"><a href="#checks">{text(words)}</a></p>'
 

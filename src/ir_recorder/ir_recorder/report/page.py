@@ -22,7 +22,7 @@ from ir_recorder.report.costs import (
 )
 from ir_recorder.report.data import page_data
 from ir_recorder.report.files import write_output
-from ir_recorder.report.headline import notes, run_tiles, source, subtitle, tiles, verdict
+from ir_recorder.report.headline import failing, notes, run_tiles, source, subtitle, tiles, verdict
 from ir_recorder.report.methods import methods_section
 from ir_recorder.report.number_text import joules, text
 from ir_recorder.report.sankey import sankey_section
@@ -110,7 +110,8 @@ def report_html(
         "name": text(name),
         "subtitle": subtitle(analysis),
         "source": source(analysis),
-        "verdict": verdict(checks),
+        "verdict": verdict(checks, analysis),
+        "failing": failing(checks),
         "notes": notes(analysis),
         "tiles": tiles(analysis, prices),
         "run": run_tiles(analysis),

@@ -22,8 +22,8 @@ from ir_recorder.report.costs import (
     cycles_of_year,
     payback,
     share_between,
-    yearly_end,
     yearly_money,
+    yearly_span,
 )
 from ir_recorder.report.files import write_output
 from ir_recorder.report.motion_scene import motion_of, power_curves, rests_of
@@ -82,6 +82,11 @@ def year_of(found: BeforeAfter, side: Side, costs: Costs) -> Year:
 # Figures of today's program and of the planner's as tables: each energy with its 90 % interval.
 
 WORK = {1: "a power mode", 2: "other times on the same path", 3: "another path"}
+_MEANINGS = {
+    "same cycle time": "the planner's, in the time of today's",
+    "free": "the planner's, as fast as pays (--time-value)",
+    "for the line": "the planner's, in the time that the line asks for",
+}
 Show = Callable[[float], str]
 _FIT = 0.999  # of the cycles: fewer are said
 
@@ -95,6 +100,7 @@ def tiles(found: BeforeAfter, costs: Costs) -> str:
     counted = year_of(found, side, costs)
     word, year = counted.saved.gain()
     _, cycle = saved_amount(saving).gain()
+    before = year_of(found, found.today, costs).energy
     sure = "" if saving.certain else OPEN
     between = share_between(cycle, saving.common)
     shown = (
@@ -102,7 +108,8 @@ def tiles(found: BeforeAfter, costs: Costs) -> str:
         (
             f"{word} a year",
             yearly_money(costs.money(year.value), costs.currency),
-            _money(year, costs),
+            _within(year, costs),
+            f"today {yearly_money(costs.money(before.value), costs.currency)} a year",
             cycles_of_year(counted.pace, costs),
             payback(counted.saved, costs),
         ),
@@ -130,6 +137,7 @@ def figure_table(found: BeforeAfter, costs: Costs) -> str:
     sides = [found.today, *found.sides]
     years = [year_of(found, side, costs) if side.found else None for side in sides]
     rows = [
+        ("the program is", text(found.name), *(_meaning(side) for side in sides[1:])),
         ("cycle time", *(_of(side, seconds(side.report.duration)) for side in sides)),
         ("energy a cycle", *(_energy(side, kilowatt_hours) for side in sides)),
         *_a_part(sides, costs),
@@ -208,23 +216,37 @@ def _keyed(side: Side) -> Sequence[tuple[tuple[str, int], str]]:
     return found
 
 
-def assumptions(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
-    """What the amounts rest on; what no file gave is named an assumption."""
+def assumptions(costs: Costs) -> str:
+    """What the amounts of money and their intervals mean, where they stand."""
+    said = "A 90 % interval holds the true figure in nine of ten cases."
+    link = '<a href="#basis">What the figures rest on</a>'
+    return f'<p class="hint">{counted_with(costs)} {said} {link}.</p>'
+
+
+def basis_section(found: BeforeAfter, cell: Cell) -> str:
+    """How the figures are made, a sentence for each choice; it is unfolded on paper."""
     parameters = found.today.report.power_parameters or "the data sheet"
     supply = " at the mains" if cell.robot.controller.counted else f" ({DRIVES_ONLY})"
     said = (
-        "Same cycle time: the planner's program in the time of today's. Free: as fast as pays, "
-        "where a second is worth some watts (--time-value). For the line: in the time that the "
-        "line asks for. A 90 % interval holds the true figure in nine of ten cases. "
-        f"All energies are predicted{supply} by the same model, with 90 % intervals from "
-        f"the uncertainty of the power parameters ({parameters}). What is saved has an interval "
-        "of its own: the same drawn robots drive both programs. Intervals by the data sheet lie "
-        "mostly above their values: losses that it puts at zero can only add. A year has as "
-        "many cycles for every program as today's can make, in the column for the line as many "
-        "as the line asks for, and there today's program waits at its end as well; what is left "
-        "of a shift counts nothing."
+        f"All energies are predicted{supply}, for every program by the same model.",
+        f"Their intervals follow from the uncertainty of the power parameters ({parameters}). "
+        "Those of the data sheet lie mostly above their values: losses that it puts at zero can "
+        "only add.",
+        "The interval of what is saved is narrower than those of the programs suggest: every "
+        "robot that is drawn from the uncertain parameters drives both programs.",
+        "A year has as many cycles for every program as today's can make; in the column for the "
+        "line as many as the line asks for, and there today's program waits at its end as well. "
+        "The rest of a shift, too short for a cycle, counts nothing.",
     )
-    return f'<p class="hint">{counted_with(costs)}</p><p class="hint">{text(said)}</p>'
+    items = "".join(f"<li>{text(one)}</li>" for one in said)
+    return (
+        '<details class="part printed"><summary><h2>What the figures rest on</h2>'
+        f'</summary><ul id="basis">{items}</ul></details>'
+    )
+
+
+def _meaning(side: Side) -> str:
+    return text(_MEANINGS.get(side.name, DASH))
 
 
 def _cell(value: str, *smaller: str) -> str:
@@ -300,7 +322,16 @@ def _co2(year: Year | None, costs: Costs) -> str:
 
 def _money(energy: Amount, costs: Costs) -> str:
     amount = energy.of(costs.money)
-    return span_of(amount.low, amount.high, yearly_end)
+    return (
+        f"{yearly_span(amount.low, amount.high)} {costs.currency}"
+        if amount.high > amount.low
+        else ""
+    )
+
+
+def _within(energy: Amount, costs: Costs) -> str:
+    between = _money(energy, costs)
+    return f"90 % interval {between}" if between else ""
 
 
 def _proof(side: Side) -> str:
@@ -354,7 +385,8 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
         "problems": _problems(found, cell),
         "tiles": tiles(found, prices),
         "figures": figure_table(found, prices),
-        "assumptions": assumptions(found, cell, prices),
+        "assumptions": assumptions(prices),
+        "basis": basis_section(found, cell),
         "line": _line(found, cell, prices),
         "assumed": assumed_section(prices),
         "changes": change_table(found, prices),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections import Counter
@@ -26,7 +25,7 @@ from ir_studies.layout.placement import Known, Variable
 from ir_studies.layout.search import GIVEN
 from ir_studies.layout.settings import Condition, LayoutSettings
 from ir_studies.layout.summary import Final, cost_words, ends, of_condition, sentences
-from ir_studies.page import page
+from ir_studies.page import page, settings_table
 from ir_values.arrays import FloatArray
 from ir_values.files import ANYWHERE
 
@@ -198,7 +197,7 @@ def page_html(
         "legend": legend(*shown_range(known)),
         "variables": "".join(_charts(known, finals, settings)),
         "impossible": _impossible(known),
-        "settings": text(json.dumps(asdict(settings))),
+        "settings": settings_table(asdict(settings)),
     }
     return page("layout", parts)
 

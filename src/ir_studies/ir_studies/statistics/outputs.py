@@ -12,7 +12,7 @@ from ir_recorder.report.number_text import DASH, significant, text
 from ir_recorder.report.page import PAGE_START
 from ir_recorder.report.step_table import write_columns
 from ir_recorder.report.tables import table
-from ir_studies.page import page
+from ir_studies.page import page, settings_table
 from ir_studies.statistics.dots import dots
 from ir_studies.statistics.findings import ASYNCHRONOUS, SYNCHRONOUS, Comparison, Findings, number
 from ir_studies.statistics.settings import DRAWN, StatisticsSettings
@@ -202,7 +202,7 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
         "agreement_dots": dots(
             found.agreements, "predicted or indirect less direct, in percent of direct"
         ),
-        "settings": text(settings.budget),
+        "settings": settings_table(settings.budget),
     }
     return page("statistics", parts)
 

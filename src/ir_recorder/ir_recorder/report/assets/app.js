@@ -18,6 +18,10 @@
     find("no-motion").hidden = false;
     find("trail-legend").hidden = true;
   }
+  laneKey(find("lane-key"), data.lanes);
+  if (!data.clearance.length) {
+    for (const part of [find("clearance-head"), find("clearance").parentElement]) part.hidden = true; /* nothing was driven */
+  }
   if (!data.scene && !data.power && !data.clearance.length) {
     for (const id of ["motion", "over-time"]) find(id).hidden = true; /* a plan without its trajectories */
   }

@@ -79,11 +79,39 @@ class Timeline {
 }
 
 const MODE_STYLE = /^m-/;
-function spanColour(style) {
-  if (MODE_STYLE.test(style)) return css(`--${style}`) || css("--m-transition");
-  const colours = { pause: "--m-transition", regional: "--a1", service_entry: "--a2", service_exit: "--a5", cartesian: "--a4", load: "--part",
-    none: "--line", bit: "--accent", moving: "--m-transition", contact: "--m-EMERGENCY_STOP" };
-  return css(colours[style] || "--a1");
+const SPAN_COLOURS = { pause: "--m-transition", regional: "--a1", service_entry: "--a2", service_exit: "--a5", cartesian: "--a4", load: "--part",
+  none: "--line", bit: "--accent", moving: "--m-transition", contact: "--m-EMERGENCY_STOP" };
+/* The variable of the page's style that colours a span. */
+function spanVariable(style) {
+  if (MODE_STYLE.test(style)) return css(`--${style}`) ? `--${style}` : "--m-transition";
+  return SPAN_COLOURS[style] || "--a1";
+}
+const spanColour = (style) => css(spanVariable(style));
+
+/* What the colours of the lanes of program and mode mean, of those that occur. */
+function laneKey(place, lanes) {
+  const KINDS = { regional: "regional movement", service_entry: "service movement to a station", service_exit: "service movement from a station",
+    cartesian: "Cartesian movement", pause: "pause" };
+  const meanings = new Map();
+  for (const lane of lanes.filter((each) => each.label === "program" || each.label === "mode")) {
+    for (const [, , label, style] of lane.spans) {
+      const variable = spanVariable(style), mode = MODE_STYLE.test(style);
+      const words = KINDS[style] || (mode && variable !== "--m-transition" ? label : mode ? "between two modes" : "");
+      if (words && !meanings.has(words)) meanings.set(words, [variable, style, lane.label]);
+    }
+  }
+  let named = "";
+  for (const [words, [variable, style, lane]] of meanings) {
+    if (lane !== named) place.append(Object.assign(document.createElement("b"), { textContent: `${lane}: ` }));
+    named = lane;
+    const item = document.createElement("span"), key = document.createElement("i");
+    key.className = "key";
+    key.style.background = `var(${variable})`;
+    if (style === "pause") key.style.opacity = 0.45;
+    item.append(key, words);
+    place.append(item);
+  }
+  place.hidden = !meanings.size;
 }
 
 class TimeChart {
