@@ -20,8 +20,9 @@ from ir_msgs_py.savings import ProgramPoint
 from ir_recorder import Analysis, analyse, findings
 from ir_recorder.analysis.production import production_of
 from ir_recorder.report.charts import COLOURS, MARKS, Point, front_chart, front_section, pareto
-from ir_recorder.report.compare import comparison_html
+from ir_recorder.report.compare import _WITH_PAUSES, comparison_html
 from ir_recorder.report.headline import source
+from ir_recorder.report.number_text import joules, seconds
 from ir_recorder.report.page import asset
 from ir_recorder.report.step_table import step_columns, write_table
 from ir_recorder.report_main import main
@@ -30,6 +31,10 @@ from ir_recorder.report_main import main
 @pytest.fixture
 def other(analysis: Analysis) -> Analysis:
     """The same run on a meter that reads a tenth more."""
+    return _dearer(analysis)
+
+
+def _dearer(analysis: Analysis) -> Analysis:
     power = analysis.recording.power
     assert power is not None
     more = replace(
@@ -177,6 +182,26 @@ def test_plans_that_were_not_driven_are_compared_by_what_was_predicted(analysis:
     assert (cycle.energy, cycle.seconds) == (3800.0, 5.7)
     assert "this run" not in front_section(plan)
     assert "Predicted" in source(plan)
+
+
+def test_a_run_with_short_pauses_is_no_share_of_one_at_full_length(analysis: Analysis) -> None:
+    """Once "+2685.83 %", and a point at the shortened time."""
+    facts = (("unshortened_pauses", "600 s, 1800 s"),)
+    short = analyse(
+        replace(analysis.recording, facts=facts, path=analysis.recording.path.with_name("s.mcap"))
+    )
+    cycle = production_of(short)
+    assert short.program is not None
+    assert short.program.unshortened is not None
+    page = page_of(analysis, short)
+    rows = {name: re.search(rf"<tr><td[^>]*>{name}</td>.*?</tr>", page) for name in _WITH_PAUSES}
+    for name, row in rows.items():
+        assert row is not None, name
+        assert "pauses shortened" in row[0]
+        assert "%" not in row[0]
+    if cycle is not None:
+        assert f"s {seconds(cycle.seconds)}, {joules(cycle.energy)}" in page
+    assert "+10.00 %" in page_of(short, _dearer(short))
 
 
 def test_the_run_stands_beside_the_common_program(analysis: Analysis) -> None:

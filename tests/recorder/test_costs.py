@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from ir_description import load_cell
 from ir_recorder import Analysis, analyse
@@ -34,6 +36,7 @@ from ir_recorder.report.costs import (
     payback,
     read_costs,
     yearly_money,
+    yearly_span,
 )
 from ir_recorder.report.fleet import fleet_html, fleet_of_line, member_of
 from ir_values.settings import settings_table
@@ -155,19 +158,19 @@ def test_rest_outside_of_the_shifts_is_priced_by_mode(analysis: Analysis) -> Non
 
 
 def test_assumptions_are_marked_and_given_figures_are_not(analysis: Analysis) -> None:
-    for given in ((), ("price",), ("shift_hours", "currency"), NAMES):
-        costs = replace(Costs(), price=0.5, given=given)
+    for own in ((), ("price",), ("shift_hours", "currency"), NAMES):
+        costs = replace(Costs(), price=0.5, given=own)
         origins = re.findall(
             r"<small>(\w+)</small></td><td[^>]*><b>([^<]*)</b><small>([^<]*)",
             assumed_section(costs),
         )
         assert [name for name, _, _ in origins] == list(NAMES)
         marked = {name for name, _, words in origins if words == "from your file"}
-        assert marked == set(given)
-        assert all(words == "assumed" for name, _, words in origins if name not in given)
+        assert marked == set(own)
+        assert all(words == "assumed" for name, _, words in origins if name not in own)
         assert ("price", "0.5 EUR/kWh") in [row[:2] for row in origins]
-        words = "all assumed" if not given else "partly assumed"
-        words = "as your file gives it" if given == NAMES else words
+        words = "all assumed" if not own else "partly assumed"
+        words = "as your file gives it" if own == NAMES else words
         assert words in costs_section(analysis, costs)
 
 
@@ -217,6 +220,16 @@ def test_amounts_that_nobody_counts_are_said_in_words() -> None:
     assert yearly_money(4.3e-8, "EUR") == "practically nothing"
     assert yearly_money(0.02, "EUR") == money(0.02, "EUR")
     assert payback(Amount(1.0, 1.0, 1.0), Costs()) == ""
+
+
+@given(st.floats(0.02, 1e6), st.floats(0.0, 1e6))
+def test_both_ends_of_an_interval_are_rounded_alike(low: float, wide: float) -> None:
+    """Once "76.19 to 123 EUR": cents beside whole euros."""
+    first, last = yearly_span(low, low + wide).replace("\u00a0", "").split(" to ")
+    assert ("." in first) <= ("." in last)
+    step = 0.5 if low + wide >= 100.0 else 0.005
+    for shown, value in ((first, low), (last, low + wide)):
+        assert abs(float(shown) - value) <= 1.01 * step
 
 
 def test_zero_inside_an_interval_is_said_on_every_page(analysis: Analysis) -> None:

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import math
+import re
 from dataclasses import replace
 
 import pytest
 
 from ir_msgs_py.savings import one_sided
-from ir_recorder import Analysis, analyse, findings
+from ir_recorder import Analysis, Finding, analyse, findings
 from ir_recorder.report import report_html
-from ir_recorder.report.headline import run_tiles, source, tiles, verdict
+from ir_recorder.report.headline import failing, run_tiles, source, tiles, verdict
+
+
+def not_driven(analysis: Analysis) -> Analysis:
+    """The plan of a recording without its run."""
+    steps = tuple(result.step.movement for result in analysis.steps)
+    bare = replace(analysis.recording, power=None, joints=None, controller=None, hardware="")
+    return analyse(replace(bare, events=(), planned=steps))
 
 
 def test_simulated_figures_are_labelled(analysis: Analysis, page: str) -> None:
@@ -40,6 +49,32 @@ def test_nothing_checked_is_not_checked() -> None:
     assert "good" not in verdict(())
 
 
+def test_a_check_that_fails_is_named_beside_the_verdict(analysis: Analysis) -> None:
+    """Its name, what was found and what is allowed; of many the first, and how many more."""
+    assert failing(findings(analysis)[:0]) == ""
+    bad = [
+        Finding(f"reading <{k}>", measured=5.0 + k, low=-math.inf, high=1.0, unit="W", reason="")
+        for k in range(5)
+    ]
+    one = report_html(analysis, bad[:1])
+    assert "The check that fails" in one
+    assert "reading &lt;0&gt;: 5 W, allowed at most 1 W" in one
+    many = failing(bad)
+    assert many.count("<li>") == 4
+    assert "2 more below" in many
+
+
+def test_a_plan_without_a_drive_says_whether_it_is_proved(analysis: Analysis) -> None:
+    """Once it read "Nothing was checked" beside "proved"."""
+    plan = not_driven(analysis)
+    assert plan.recording.only_planned
+    for proved, word in ((True, "Plan proved"), (False, "Plan not proved")):
+        own = replace(plan, recording=replace(plan.recording, planned_certified=proved))
+        shown = verdict((), own)
+        assert f"{word}; nothing driven to check" in shown
+        assert "good" not in shown
+
+
 def test_shortened_pauses_stand_beside_the_energy_of_the_full_cycle(analysis: Analysis) -> None:
     facts = (("unshortened_pauses", "600 s, 1800 s"),)
     found = analyse(replace(analysis.recording, facts=facts))
@@ -60,3 +95,10 @@ def test_pauses_are_in_the_figures_of_the_run(analysis: Analysis) -> None:
 def test_a_value_at_the_lower_end_of_its_interval_says_why(low: float, said: bool) -> None:
     assert bool(one_sided(100.0, low, 120.0)) is said
     assert one_sided(100.0, 100.0, 100.0) == ""
+
+
+def test_a_plan_has_one_row_of_tiles_and_no_part_is_lost(analysis: Analysis) -> None:
+    shown = tiles(not_driven(analysis))
+    assert shown.count('class="tile"') <= 5
+    for part in ("movements", "pauses"):
+        assert re.search(rf"<small>{part} [\d ]+ J in [\d.]+ s</small>", shown), part

@@ -179,3 +179,13 @@ def test_small_differences_keep_a_digit_and_movements_in_the_interval_are_counte
     assert "   599  measured within the predicted 90 % interval" in said(rows)
     assert "+0.003 to +0.003" in said(rows[1:])
     assert [percent(value) for value in (0.0, -3e-5, 12.0)] == ["0.00", "-0.00003", "+12.00"]
+
+
+def test_settings_stand_as_a_table_without_the_empty_ones() -> None:
+    """Once a dictionary in braces."""
+    page = page_html(findings_of(pairs(0.1, 0.2)), ASKED)
+    shown = page.partition("<h2>Settings</h2>")[2].partition("</section>")[0]
+    assert "{" not in shown
+    for name, value in ASKED.budget.items():
+        assert (f"<code>{name}</code>" in shown) == (value not in ("", (), {}))
+    assert ">0.02<" in shown

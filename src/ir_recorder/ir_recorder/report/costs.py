@@ -33,6 +33,7 @@ from ir_recorder.report.number_text import (
     significant,
     span_of,
     text,
+    watt_hours,
     watts,
 )
 from ir_recorder.report.tables import table
@@ -376,7 +377,7 @@ def yearly_money(value: float, currency: str) -> str:
     """An amount of a year; in words where it is below a hundredth of the currency."""
     if 0.0 < abs(value) < _NOTHING:
         return "practically nothing"
-    return money(value, currency)
+    return f"{value:.2f} {currency}" if abs(value) < 1.0 else money(value, currency)
 
 
 def yearly_span(low: float, high: float) -> str:
@@ -529,7 +530,7 @@ def lever_section(analysis: Analysis, costs: Costs) -> str:
     rows = (
         (
             text(lever.name),
-            f"<b>{kilowatt_hours(lever.joules)}</b>",
+            f"<b>{watt_hours(lever.joules)}</b>",
             share(lever.joules, cycle.energy),
             text(yearly_money(costs.money(lever.joules * yearly), costs.currency)),
             f"{text(lever.means)}<small>counted: {text(lever.basis)}</small>",

@@ -194,23 +194,20 @@ def _planned(analysis: Analysis) -> list[Tile]:
     """Figures of a plan that was not driven, all predicted."""
     steps = analysis.recording.planned
     tiles = []
-    for name, part in (
-        ("planned program", "whole"),
-        ("movements", "movements"),
-        ("pauses", "pauses"),
-    ):
-        found = planned_share(steps, part)
-        within = planned_interval(analysis.recording) if part == "whole" else None
-        if found is None:
-            continue
+    whole = planned_share(steps, "whole")
+    if whole is not None:
+        within = planned_interval(analysis.recording)
         spread = f"90 % interval {span_of(*within, kilowatt_hours)}" if within is not None else ""
-        why = _says(one_sided(found.energy, *within)) if within is not None else ""
+        why = _says(one_sided(whole.energy, *within)) if within is not None else ""
+        parts = (planned_share(steps, part) for part in ("movements", "pauses"))
+        lines = (
+            f"{found.name} {joules(found.energy)} in {seconds(found.seconds)}"
+            for found in parts
+            if found is not None
+        )
+        said = f"{joules(whole.energy)} in {seconds(whole.seconds)}, predicted"
         tiles.append(
-            Tile(
-                name,
-                kilowatt_hours(found.energy),
-                (f"{joules(found.energy)} in {seconds(found.seconds)}, predicted", spread, why),
-            )
+            Tile("planned program", kilowatt_hours(whole.energy), (said, *lines, spread, why))
         )
     near = millimetres(planned_clearance(steps))
     proved = analysis.recording.planned_certified

@@ -61,6 +61,11 @@ def kilowatt_hours(value: float) -> str:
     return f"{_fixed(kwh, 0) if abs(kwh) >= 100.0 else significant(kwh, 3)} kWh"
 
 
+def watt_hours(value: float) -> str:
+    """Joules as Wh with three significant digits: for a column whose figures are far apart."""
+    return f"{significant(value / 3600.0, 3)} Wh" if math.isfinite(value) else DASH
+
+
 def kilograms(value: float) -> str:
     """kg with three significant digits, whole ones from 100 on."""
     if not math.isfinite(value):

@@ -37,6 +37,7 @@ from ir_recorder.report.number_text import (
     seconds,
     span_of,
     text,
+    watt_hours,
     watts,
 )
 from ir_recorder.report.page import PAGE_START, asset
@@ -176,19 +177,17 @@ def change_table(found: BeforeAfter, costs: Costs) -> str:
         return '<p class="empty">No change saves as much as a joule.</p>'
     cycles = year_of(found, found.planned, costs).cycles_a_year
     rows = [_change(k, change, cycles, costs) for k, change in enumerate(found.changes, start=1)]
-    heads = ("#", "where", "work", "what to do", ">saved a cycle", ">saved a year")
+    heads = ("where", "what to do", ">saved a cycle", ">saved a year")
     return table(heads, rows, "Changes")
 
 
 def _change(k: int, change: Change, cycles: float, costs: Costs) -> tuple[str, ...]:
     saving = change.saving
-    between = span_of(saving.saved_low, saving.saved_high, kilowatt_hours)
+    between = span_of(saving.saved_low, saving.saved_high, watt_hours)
     return (
-        str(k),
-        text(change.name),
-        text(WORK[change.work]),
+        f"{k}. {text(change.name)}<small>{text(WORK[change.work])}</small>",
         text(change.words),
-        _cell(kilowatt_hours(saving.saved), between, "" if saving.certain else OPEN),
+        _cell(watt_hours(saving.saved), between, "" if saving.certain else OPEN),
         text(yearly_money(costs.money(saving.saved * cycles), costs.currency)),
     )
 
