@@ -19,7 +19,12 @@ from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_planner import CancelledError, Goal, Planner, PlannerError
 from ir_planner.before_after import before_after_common
 from ir_recorder.report.costs import Costs
-from ir_recorder.report.program_comparison import assumptions, change_table, figure_table
+from ir_recorder.report.program_comparison import (
+    assumptions,
+    basis_section,
+    change_table,
+    figure_table,
+)
 from ir_values.errors import IrError
 
 # The latest action of each kind counts: a quick hand drags a machine through a hundred places a
@@ -225,7 +230,7 @@ class PlanWorker:
         found = before_after_common(planner, asked.stations, start, 0.0, options, progress)
         costs = Costs()
         figures = figure_table(found, costs) + change_table(found, costs)
-        return Planned(None, compared=figures + assumptions(found, cell, costs))
+        return Planned(None, compared=figures + assumptions(costs) + basis_section(found, cell))
 
     def _stop_if_old(self, asked: ViewRequest) -> None:
         if self._latest != asked.number:

@@ -382,9 +382,8 @@ def _powers(analyses: Sequence[Analysis], names: Sequence[str]) -> dict[str, Jso
             spent = np.interp(edges + analysis.steps[0].step.start, power.time, power.energy)
             value[:, k] = np.diff(spent) / np.diff(edges)
     curves = Curves("power at the mains", "W", (edges[1:] + edges[:-1]) / 2.0, value)
-    ends = [
-        analyses[k].program.whole.seconds if analyses[k].program is not None else 0.0 for k in drawn
-    ]
+    programs = [analyses[k].program for k in drawn]
+    ends = [program.whole.seconds if program is not None else 0.0 for program in programs]
     return {**packed(curves), "names": [names[k] for k in drawn], "ends": ends}
 
 

@@ -200,14 +200,14 @@ def _planned(analysis: Analysis) -> list[Tile]:
         spread = f"90 % interval {span_of(*within, kilowatt_hours)}" if within is not None else ""
         why = _says(one_sided(whole.energy, *within)) if within is not None else ""
         parts = (planned_share(steps, part) for part in ("movements", "pauses"))
-        lines = (
+        own = [
             f"{found.name} {joules(found.energy)} in {seconds(found.seconds)}"
             for found in parts
             if found is not None
-        )
+        ]
         said = f"{joules(whole.energy)} in {seconds(whole.seconds)}, predicted"
         tiles.append(
-            Tile("planned program", kilowatt_hours(whole.energy), (said, *lines, spread, why))
+            Tile("planned program", kilowatt_hours(whole.energy), (said, *own, spread, why))
         )
     near = millimetres(planned_clearance(steps))
     proved = analysis.recording.planned_certified
