@@ -97,9 +97,11 @@ def _made(source: RobotSource) -> MadeRobot:
     shapes = capsules_of(arm, bodies, names, sheet.radii)
     low, high = (np.radians(sheet.values[f"position_{end}_deg"].numbers) for end in ("min", "max"))
     _check_leaders(arm, low, high)
-    pairs = pairs_of(arm, shapes.capsules, bodies, low, high)
+    given = sheet.values.get("machine_home_deg")
+    home = None if given is None else np.radians(given.numbers)
+    pairs = pairs_of(arm, shapes.capsules, bodies, low, high, home)
     notes = [*arm.notes, *meshes.notes, *masses, *sheet.notes]
-    if "machine_home_deg" not in sheet.values:
+    if given is None:
         sheet = with_home(sheet, _home(arm, sheet, shapes, pairs, (low, high)))
     text = robot_text(
         arm, sheet, shapes.capsules, pairs.pairs, pairs.reduced, _comments(source, shapes, notes)

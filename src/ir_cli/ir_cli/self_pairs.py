@@ -37,6 +37,7 @@ LEAST_LEFT = 0.1
 """Share of postures that two links must leave to be told apart by their capsules."""
 _WIDEST = 0.4  # of the postures, of links that can't be told apart
 _WIDE = "that leaves no posture: lowered to what the widest 40 % keep"
+_AT_HOME = "lowered to what the given home posture keeps"
 _VOXELS = 60  # along a part: one point stands for the surface in each
 _LOOKED_AT = 48  # postures, for what is built so and in a round around those that meet
 _TRIED = 500  # postures in which capsules overlap, but by no more than usual
@@ -59,8 +60,11 @@ def pairs_of(
     bodies: Sequence[Sequence[LinkBody]],
     low: FloatArray,
     high: FloatArray,
+    home: FloatArray | None,
 ) -> Pairs:
-    """All pairs of capsules of links that are no neighbours."""
+    """All pairs of capsules of links that are no neighbours; home: a given one [rad], at which the
+    robot stands whatever its capsules say.
+    """
     far = [
         (a.name, b.name)
         for k, a in enumerate(capsules)
@@ -78,6 +82,8 @@ def pairs_of(
         if float((distance[:, z] <= SAFETY).mean()) > NEAR:
             links = sorted((named[first].link, named[second].link))
             groups.setdefault((links[0], links[1]), []).append(z)
+    at_home = np.inf if home is None else model.distances(home[None])[0]
+    least_at_home = np.broadcast_to(at_home, distance.shape[1:]) - ROOM
     reduced = []
     for near in groups.values():
         own = []
@@ -89,9 +95,11 @@ def pairs_of(
         lower = min(0.0, float(np.quantile(room, 1.0 - _WIDEST)))
         if float((room > 0.0).mean()) < LEAST_LEFT:
             own = [(kept + lower, f"{reason}; {_WIDE}") for kept, reason in own]
-        reduced += [
-            ReducedDistance(*model.pairs[z][1:], *each) for z, each in zip(near, own, strict=True)
-        ]
+        for z, (kept, reason) in zip(near, own, strict=True):
+            if least_at_home[z] < kept:
+                kept = float(least_at_home[z])
+                reason = f"{reason}; {_AT_HOME}"
+            reduced.append(ReducedDistance(*model.pairs[z][1:], kept, reason))
     return Pairs(tuple(far), tuple(reduced))
 
 
