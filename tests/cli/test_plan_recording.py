@@ -23,7 +23,7 @@ from ir_recorder.analysis.production import planned_interval
 from ir_recorder.reading.mcap_file import RawRecording, read_raw
 from ir_recorder.report import report_html
 from ir_recorder.report.compare import comparison_html
-from ir_recorder.report.number_text import joules
+from ir_recorder.report.number_text import joules, kilowatt_hours
 
 
 def assert_planned_figures_are_those_of_the_answer(analysis: Analysis, raw: RawRecording) -> None:
@@ -39,7 +39,7 @@ def assert_planned_figures_are_those_of_the_answer(analysis: Analysis, raw: RawR
     assert [step.duration for step in planned] == [step.duration for step in steps]
     assert [step.from_station for step in planned] == [step.from_station for step in steps]
     assert analysis.problems == ()  # nothing is missing: nothing was driven
-    energy = joules(sum(step.report.energy for step in steps))
+    energy = kilowatt_hours(sum(step.report.energy for step in steps))
     drawn = report_html(analysis, ())
     assert f"<b>{energy}</b>" in drawn
     assert analysis.recording.planned_certified == report.certified
