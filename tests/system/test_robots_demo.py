@@ -19,6 +19,8 @@ from _robots_judge import Judge, Path
 
 from ir_description import load_robot_cells
 
+pytestmark = pytest.mark.long  # two drivers and two runners in real time want a quiet machine
+
 PATIENCE = 3600.0  # s; it takes a minute where it is alone
 MARGIN = 0.02  # m: S_m
 OFF = 0.002  # m that the tools of both are off their paths, on the nominal plant
