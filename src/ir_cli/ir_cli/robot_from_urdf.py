@@ -98,7 +98,7 @@ def _made(source: RobotSource) -> MadeRobot:
     low, high = (np.radians(sheet.values[f"position_{end}_deg"].numbers) for end in ("min", "max"))
     _check_leaders(arm, low, high)
     given = sheet.values.get("machine_home_deg")
-    home = None if given is None else np.radians(given.numbers)
+    home = None if given is None else np.asarray(np.radians(given.numbers), dtype=np.float64)
     pairs = pairs_of(arm, shapes.capsules, bodies, low, high, home)
     notes = [*arm.notes, *meshes.notes, *masses, *sheet.notes]
     if given is None:

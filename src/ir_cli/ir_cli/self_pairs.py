@@ -82,8 +82,9 @@ def pairs_of(
         if float((distance[:, z] <= SAFETY).mean()) > NEAR:
             links = sorted((named[first].link, named[second].link))
             groups.setdefault((links[0], links[1]), []).append(z)
-    at_home = np.inf if home is None else model.distances(home[None])[0]
-    least_at_home = np.broadcast_to(at_home, distance.shape[1:]) - ROOM
+    least_at_home = np.full(distance.shape[1], np.inf)
+    if home is not None:
+        least_at_home = model.distances(home[None])[0] - ROOM
     reduced = []
     for near in groups.values():
         own = []
