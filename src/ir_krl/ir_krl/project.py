@@ -186,7 +186,8 @@ def _of_archive(path: Path) -> Iterator[File]:
                     with archive.open(one) as entry:
                         yield File(inside, entry.read(BYTES_MAX + 1))
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
-        # damaged, truncated, packed in a way that zipfile hasn't, or encrypted
+        # damaged, truncated, encrypted, or packed in a way for which zipfile itself raises
+        # NotImplementedError
         raise KrlError(f"{path.name} is no archive that can be read: {error}") from error
 
 

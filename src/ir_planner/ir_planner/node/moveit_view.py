@@ -66,7 +66,8 @@ def _placed(points: FloatArray, pose: FloatArray) -> FloatArray:
 def pieces_of(body: Body) -> list[Piece]:
     """A body in the cell as MoveIt's shapes: it has neither capsules nor planes that are drawn."""
     pose = body.pose
-    radius, length = float(body.size[0]), float(body.size[1])
+    radius = float(body.size[0])
+    length = float(body.size[1])
     if body.kind == "capsule":
         ends = [_lifted(pose, side * 0.5 * length) for side in (-1.0, 1.0)]
         balls = [Piece("sphere", end, (radius,)) for end in ends]

@@ -290,7 +290,8 @@ class Movements:
             if slower is not None and (found is None or slower.cost < found.cost):
                 return slower
         else:
-            if known and (again := optimised_near(known, context)) is not None:
+            again = optimised_near(known, context) if known else None
+            if again is not None:
                 return again
             status, found = search_regional(*self.ends(part), asked, self.searches)
         self._logs[self._key(part)] = context.journal.logs
