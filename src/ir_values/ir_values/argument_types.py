@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property, wraps
+from dataclasses import dataclass
+from functools import cache, cached_property, partial, wraps
 from numbers import Integral, Real
 from types import NoneType, UnionType
 from typing import Any, ParamSpec, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -20,12 +21,16 @@ from typing import Any, ParamSpec, TypeVar, Union, get_args, get_origin, get_typ
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ir_values.arrays import FloatArray
 from ir_values.errors import shown
 
 P = ParamSpec("P")
 R = TypeVar("R")
 C = TypeVar("C")
 Refusal = Callable[[str], Exception]
+Check = Callable[[Any], bool]
+_LISTS = (tuple, list, Sequence)
+_ROWS = (Sequence, np.ndarray)
 _NAMES: dict[object, str] = {
     float: "a number",
     int: "a whole number",
@@ -41,18 +46,32 @@ _NUMBERS: dict[object, tuple[type, ...]] = {
 }
 
 
-def fits(value: object, kind: Any) -> bool:
-    """Whether a value is what an annotation says."""
+@cache
+def check_of(kind: Any) -> Check:
+    """What says of a value whether it is what an annotation says."""
     origin = get_origin(kind)
     if kind in _NUMBERS:
-        return isinstance(_scalar(value), _NUMBERS[kind]) and _is_float(value)
+        return partial(_is_number, _NUMBERS[kind])
     if origin in (Union, UnionType):
-        return any(fits(value, one) for one in _alternatives(kind))
+        checks = tuple(map(check_of, _alternatives(kind)))
+        return lambda value: any(check(value) for check in checks)
     if kind is np.ndarray or origin is np.ndarray:
-        return _is_array(value)
-    if origin in (tuple, list, Sequence, Mapping):
-        return _is_list(value, origin, get_args(kind))
-    return isinstance(value, kind) if isinstance(kind, type) else True
+        return _is_array
+    if origin is Mapping:
+        names, values = map(check_of, get_args(kind))
+        return partial(_is_mapping, names, values)
+    if origin in _LISTS:
+        first = get_args(kind)[0]
+        return partial(_is_list, Sequence if first is str else _ROWS, check_of(first))
+    return _of_class(kind) if isinstance(kind, type) else _holds_anything
+
+
+def _of_class(kind: type) -> Check:
+    return lambda value: isinstance(value, kind)
+
+
+def _holds_anything(value: object) -> bool:
+    return True
 
 
 def _alternatives(kind: Any) -> list[Any]:
@@ -64,20 +83,22 @@ def _alternatives(kind: Any) -> list[Any]:
     return [np.ndarray, *(one for one in args if one not in arrays)]
 
 
-def _is_list(value: object, origin: object, kinds: tuple[Any, ...]) -> bool:
-    if origin is Mapping:
-        return isinstance(value, Mapping) and all(
-            fits(name, kinds[0]) and fits(each, kinds[1]) for name, each in value.items()
-        )
-    listed = Sequence if kinds[0] is str else (Sequence, np.ndarray)
+def _is_mapping(of_names: Check, of_values: Check, value: object) -> bool:
+    return isinstance(value, Mapping) and all(
+        of_names(name) and of_values(each) for name, each in value.items()
+    )
+
+
+def _is_list(listed: Any, of_each: Check, value: object) -> bool:
     if not isinstance(value, listed) or isinstance(value, (str, bytes)):
         return False
-    return all(fits(each, kinds[0]) for each in value)
+    return all(map(of_each, value))
 
 
-def _scalar(value: object) -> object:
-    """A number, out of an array without axes where it is in one."""
-    return value[()] if isinstance(value, np.ndarray) and value.ndim == 0 else value
+def _is_number(numbers: tuple[type, ...], value: object) -> bool:
+    """Whether it is a number, or an array without axes that holds one."""
+    number = value[()] if isinstance(value, np.ndarray) and value.ndim == 0 else value
+    return isinstance(number, numbers) and _is_float(number)
 
 
 def _is_float(value: Any) -> bool:
@@ -90,6 +111,8 @@ def _is_float(value: Any) -> bool:
 
 
 def _is_array(value: object) -> bool:
+    if isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
+        return value.ndim > 0
     if value is None or isinstance(value, (str, bytes, Mapping)) or callable(value):
         return False
     try:
@@ -98,12 +121,29 @@ def _is_array(value: object) -> bool:
         return False
 
 
+def _is_float_array(kind: Any) -> bool:
+    """Whether lists are taken for arrays of floats alone, or None."""
+    alternatives = _alternatives(kind) if get_origin(kind) in (Union, UnionType) else [kind]
+    arrays = [one for one in alternatives if one is np.ndarray or one == FloatArray]
+    return bool(arrays) and not any(get_origin(one) in _LISTS for one in alternatives)
+
+
+def _as_array(value: object) -> object:
+    """A list of numbers as the array that it stands for; all else as it is."""
+    if not isinstance(value, (list, tuple)):
+        return value
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        return value
+
+
 def described(kind: Any) -> str:
     """An annotation as a sentence says it."""
     origin = get_origin(kind)
     if origin in (Union, UnionType):
         return " or ".join(dict.fromkeys(map(described, _alternatives(kind))))
-    if origin in (tuple, list, Sequence):
+    if origin in _LISTS:
         return "a list"
     if origin is Mapping:
         return "a mapping"
@@ -111,50 +151,76 @@ def described(kind: Any) -> str:
     return name or f"a {getattr(origin or kind, '__name__', kind)}"
 
 
-class _Arguments:
-    """The arguments of one callable."""
+@dataclass(frozen=True)
+class _Argument:
+    """One argument; converted: a list is handed on as the array that it was looked at as, so that
+    long ones are converted once.
+    """
 
-    def __init__(self, call: Callable[..., Any], bound: bool) -> None:
-        self.call = call
-        parameters = list(inspect.signature(call).parameters.values())[1 if bound else 0 :]
-        self.names = [
-            one.name
-            for one in parameters
+    name: str
+    kind: Any
+    check: Check
+    converted: bool
+
+
+class _Arguments:
+    """The arguments of one callable; `self` has no annotation."""
+
+    def __init__(self, call: Callable[..., Any]) -> None:
+        self._call = call
+
+    @cached_property
+    def _by_name(self) -> dict[str, _Argument]:
+        """Read when it is first called: an annotation may name what is defined later."""
+        return {
+            name: _Argument(name, kind, check_of(kind), _is_float_array(kind))
+            for name, kind in get_type_hints(self._call).items()
+        }
+
+    @cached_property
+    def _in_order(self) -> list[_Argument | None]:
+        """Those that may be given by their place; None without an annotation."""
+        return [
+            self._by_name.get(one.name)
+            for one in inspect.signature(self._call).parameters.values()
             if one.kind in (one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD)
         ]
 
-    @cached_property
-    def kinds(self) -> dict[str, Any]:
-        """The annotation of each, read when it is first called: it may name what is defined
-        later.
-        """
-        return get_type_hints(self.call)
-
-    def fault(self, args: Sequence[object], named: Mapping[str, object]) -> str:
-        """The sentence about the first that doesn't fit, "" where all do."""
-        kinds = self.kinds
-        for name, value in (*zip(self.names, args, strict=False), *named.items()):
-            kind = kinds.get(name)
-            if kind is None or type(value) is kind or fits(value, kind):
-                continue
-            return f"{name} is {shown(value)}: it must be {described(kind)}"
-        return ""
+    def taken(
+        self, args: Sequence[Any], named: Mapping[str, Any], refusal: Refusal
+    ) -> tuple[list[Any], dict[str, Any]]:
+        """The arguments as they are handed on; raises `refusal` of the first that doesn't fit."""
+        by_place = list(args)
+        for k, argument in enumerate(self._in_order[: len(by_place)]):
+            by_place[k] = _taken(argument, by_place[k], refusal)
+        by_name = {
+            name: _taken(self._by_name.get(name), value, refusal) for name, value in named.items()
+        }
+        return by_place, by_name
 
 
-def typed(refusal: Refusal, *, bound: bool = False) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Decorates a callable so that it raises `refusal(sentence)` for an argument of another type;
-    bound: the first one is left out.
+def _taken(argument: _Argument | None, value: Any, refusal: Refusal) -> Any:
+    if argument is None or type(value) is argument.kind:
+        return value
+    if argument.converted:
+        value = _as_array(value)
+    if argument.check(value):
+        return value
+    raise refusal(f"{argument.name} is {shown(value)}: it must be {described(argument.kind)}")
+
+
+def typed(refusal: Refusal) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Decorates a callable so that it raises `refusal(sentence)` for an argument of another
+    type.
     """
 
     def decorated(call: Callable[P, R]) -> Callable[P, R]:
-        arguments = _Arguments(call, bound)
+        arguments = _Arguments(call)
 
         @wraps(call)
         def checked(*args: P.args, **named: P.kwargs) -> R:
-            fault = arguments.fault(args[1:] if bound else args, named)
-            if fault:
-                raise refusal(fault)
-            return call(*args, **named)
+            by_place, by_name = arguments.taken(args, named, refusal)
+            return call(*by_place, **by_name)
 
         return checked
 
@@ -165,7 +231,7 @@ def typed_methods(refusal: Refusal) -> Callable[[type[C]], type[C]]:
     """Decorates a class so that its construction and its public methods are `typed`."""
 
     def decorated(of: type[C]) -> type[C]:
-        checked = typed(refusal, bound=True)
+        checked = typed(refusal)
         for name, member in list(vars(of).items()):
             if name.startswith("_") and name != "__init__":
                 continue
