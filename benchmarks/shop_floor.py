@@ -32,7 +32,7 @@ from ir_krl import follow, parse, plc_input
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner, ProgramPlan, RequestError
 from ir_planner.krl import KrlExport, evaluate_krl, export_krl, tool_in_flange
-from ir_planner.krl.judged import contacts_at, scenes_of
+from ir_planner.krl.step_evaluation import contacts_at, scenes_of
 
 SEEDS = 3
 QUICK_SEEDS = 1

@@ -1,4 +1,4 @@
-"""An export is judged with the doors as the program's signals move them, sweeping while they do."""
+"""An export is evaluated with doors as the program's signals move them, sweeping meanwhile."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_planner import Planner
-from ir_planner.krl.judged import judge_of
+from ir_planner.krl.step_evaluation import evaluator_of
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +51,8 @@ def test_doors_are_as_the_signals_before_a_movement_have_them(
         kind=MovementKind.PAUSE, to_station="lathe_work", duration=0.1, set_signals=asked
     )
     steps = (pause, replace(step, wait_for=awaited))
-    judge = judge_of(steps, planner.cell, planner.scene("").power, planner.scene("").drives, 0.02)
+    judge = evaluator_of(
+        steps, planner.cell, planner.scene("").power, planner.scene("").drives, 0.02
+    )
     assert step.trajectory is not None
     assert judge(step.trajectory, steps[1]).verification.certified is certified

@@ -33,15 +33,15 @@ from ir_krl.run.notes import Effect, Note, worst_first
 from ir_krl.run.program import Followed
 from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES
 from ir_krl.write.names import INPUT, OUTPUT, Numbers, Wiring, check_name
-from ir_krl.write.parts import (
+from ir_krl.write.program import GRIP, Texts
+from ir_krl.write.statements import (
     Attached,
-    Part,
     WrittenHandling,
     WrittenMove,
     WrittenPause,
     WrittenSignals,
+    WrittenStatement,
 )
-from ir_krl.write.program import GRIP, Texts
 from ir_values.arrays import FloatArray
 
 # Frames: a UR's flange is KUKA's, turned a quarter about z.
@@ -362,7 +362,7 @@ class _Writer:
     wiring: Wiring
     lines: list[str] = field(default_factory=list)
 
-    def add(self, part: Part) -> None:
+    def add(self, part: WrittenStatement) -> None:
         """Append the lines of a part. Raises KrlError for one that a UR hasn't."""
         match part:
             case WrittenMove():
@@ -413,7 +413,7 @@ def payload_line(load: Payload) -> str:
 def written_urscript(
     name: str,
     start: FloatArray,
-    parts: Sequence[Part],
+    parts: Sequence[WrittenStatement],
     attached: Attached,
     header: Callable[[Texts], Sequence[str]] | Sequence[str],
     limits: JointLimits,

@@ -2,20 +2,6 @@
 
 from ir_krl.write.names import NAME_MAX, Numbers, SignalNames, Wiring, check_name
 from ir_krl.write.numbering import BASES_MAX, Chosen, FrameNumbers, base_numbers, tool_numbers
-from ir_krl.write.parts import (
-    STYLES,
-    URSCRIPT,
-    Attached,
-    Part,
-    Style,
-    WrittenHandling,
-    WrittenMove,
-    WrittenPath,
-    WrittenPause,
-    WrittenSignals,
-    WrittenSpline,
-    check_style,
-)
 from ir_krl.write.plc import PlcPause, plc_input, plc_table, read_plc_table, structured_text
 from ir_krl.write.program import (
     GRIP,
@@ -25,6 +11,20 @@ from ir_krl.write.program import (
     Texts,
     check_signal,
     written,
+)
+from ir_krl.write.statements import (
+    STYLES,
+    URSCRIPT,
+    Attached,
+    Style,
+    WrittenHandling,
+    WrittenMove,
+    WrittenPath,
+    WrittenPause,
+    WrittenSignals,
+    WrittenSpline,
+    WrittenStatement,
+    check_style,
 )
 
 __all__ = [
@@ -40,7 +40,6 @@ __all__ = [
     "Chosen",
     "FrameNumbers",
     "Numbers",
-    "Part",
     "PlcPause",
     "SignalNames",
     "Style",
@@ -52,6 +51,7 @@ __all__ = [
     "WrittenPause",
     "WrittenSignals",
     "WrittenSpline",
+    "WrittenStatement",
     "base_numbers",
     "check_name",
     "check_signal",

@@ -8,7 +8,7 @@ import numpy as np
 
 from ir_krl.errors import Place
 from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES, components, frame
-from ir_krl.write.parts import Style, WrittenMove
+from ir_krl.write.statements import Style, WrittenMove
 from ir_values.arrays import FloatArray
 
 # The texts after ";%{" tell the editor which form it is; the lines below them are what the form

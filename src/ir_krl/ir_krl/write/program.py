@@ -15,9 +15,8 @@ from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES
 from ir_krl.write.forms import Forms, decimal, frame_text
 from ir_krl.write.names import INPUT, OUTPUT, WIDTHS, Numbers, Wiring, check_name
 from ir_krl.write.numbering import BASES_MAX, TOOL_HIGHEST
-from ir_krl.write.parts import (
+from ir_krl.write.statements import (
     Attached,
-    Part,
     Style,
     WrittenHandling,
     WrittenMove,
@@ -25,6 +24,7 @@ from ir_krl.write.parts import (
     WrittenPause,
     WrittenSignals,
     WrittenSpline,
+    WrittenStatement,
 )
 from ir_values.arrays import FloatArray
 
@@ -73,7 +73,7 @@ class Texts:
 def written(
     name: str,
     start: FloatArray,
-    parts: Sequence[Part],
+    parts: Sequence[WrittenStatement],
     attached: Attached,
     header: Callable[[Texts], Sequence[str]] | Sequence[str],
     *,
@@ -163,7 +163,7 @@ class _Body:
         self._rests = False
         self._grips = False
 
-    def add(self, part: Part) -> None:
+    def add(self, part: WrittenStatement) -> None:
         """Append the lines of a part."""
         match part:
             case WrittenSpline():

@@ -18,7 +18,6 @@ from ir_krl import (
     FrameNumbers,
     KrlError,
     Numbers,
-    Part,
     Payload,
     PlcPause,
     Style,
@@ -29,6 +28,7 @@ from ir_krl import (
     WrittenPause,
     WrittenSignals,
     WrittenSpline,
+    WrittenStatement,
     base_numbers,
     check_name,
     check_signal,
@@ -46,8 +46,8 @@ from ir_planner.errors import RequestError
 from ir_planner.krl.execution import drive
 from ir_planner.krl.geometry import tool_in_flange
 from ir_planner.krl.inline_moves import fitted_moves
-from ir_planner.krl.judged import Judge, ReadBack, called, points_of
 from ir_planner.krl.makes import Make, make_of, make_remark
+from ir_planner.krl.step_evaluation import ReadBack, StepEvaluator, called, points_of
 from ir_planner.krl.strokes import deviation_along, fitted_path, one_after_the_other
 from ir_planner.krl.surroundings import Surroundings, payload_of
 from ir_planner.krl.timed_splines import DEVIATION_MAX, deviation_in_time, fitted_spline
@@ -95,7 +95,7 @@ def export(
     steps: Sequence[PlannedMovement],
     name: str,
     scene: PlanningScene,
-    judge: Judge,
+    evaluator: StepEvaluator,
     times: TransitionTimes,
     style: str,
     around: Callable[[Followed], Surroundings],
@@ -112,7 +112,7 @@ def export(
         raise RequestError(StatusCode.INVALID_MOTION_PLAN, "the program has no movement to export")
     check_name(name)
     asked = numbers or FrameNumbers()
-    return _Job(steps, name, scene, judge, times, check_style(style), around, asked).done()
+    return _Job(steps, name, scene, evaluator, times, check_style(style), around, asked).done()
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +131,7 @@ class _Job:
         steps: Sequence[PlannedMovement],
         name: str,
         scene: PlanningScene,
-        judge: Judge,
+        evaluator: StepEvaluator,
         times: TransitionTimes,
         style: Style,
         around: Callable[[Followed], Surroundings],
@@ -141,12 +141,12 @@ class _Job:
         self._steps = steps
         self._name = name
         self._scene = scene
-        self._judge = judge
+        self._evaluator = evaluator
         self._times = times
         self._style = style
         self._make = make_of(style, scene)
         self._pauses = _plc_pauses(steps, times)
-        self._loads = _loads(steps, judge)
+        self._loads = _loads(steps, evaluator)
         self._bases = self._machines() if style in _WITH_BASES else {}
         self._tools_chosen, self._bases_chosen = self._chosen(asked)
         self._start = points_of(next(step for step in steps if not step.is_pause)).positions[0]
@@ -180,7 +180,7 @@ class _Job:
 
     def _fitted(self, step: PlannedMovement) -> tuple[list[_Motion], int]:
         """The motions of a movement, and how many times they come to rest."""
-        scene = self._judge.scene(step)
+        scene = self._evaluator.scene(step)
         planned = points_of(step)
         back = _read_back(planned.positions[0], scene, self._make)
         parts: list[_Motion]
@@ -193,9 +193,9 @@ class _Job:
                 )
             parts = list(fitted_path(step, planned, scene, back))
         elif self._style == "spline":
-            parts = [fitted_spline(step, self._judge, back)]
+            parts = [fitted_spline(step, self._evaluator, back)]
         else:
-            parts = list(fitted_moves(step, self._judge, back, self._style))
+            parts = list(fitted_moves(step, self._evaluator, back, self._style))
         return parts, len(back(parts))
 
     def _written(self, comments: Sequence[str], header: Sequence[str]) -> Texts:
@@ -222,9 +222,9 @@ class _Job:
             numbers=_numbers(self._scene.cell),
         )
 
-    def _parts(self, step: PlannedMovement, comment: str, carried: int) -> list[Part]:
+    def _parts(self, step: PlannedMovement, comment: str, carried: int) -> list[WrittenStatement]:
         waits = WrittenSignals(wait_for=_signals(step.wait_for))
-        parts: list[Part] = [waits] if step.wait_for else []
+        parts: list[WrittenStatement] = [waits] if step.wait_for else []
         if step.is_pause:
             pause = self._pauses.get(id(step))
             parts.append(WrittenPause(comment, step.duration, pause.number if pause else 0))
@@ -304,7 +304,7 @@ class _Job:
         after = []
         here = self._start
         for step in self._steps:
-            scene = self._judge.scene(step)
+            scene = self._evaluator.scene(step)
             if step.is_pause:
                 mode = self._pauses[id(step)].power_mode if id(step) in self._pauses else ""
                 pause = Pause(step.to_station, step.duration, mode, here, scene)
@@ -312,7 +312,7 @@ class _Job:
                 after.append(replace(step, report=stood.report, power_mode=mode))
                 continue
             again = driven[id(step)].trajectory
-            found = self._judge(again, step)
+            found = self._evaluator(again, step)
             if not found.verification.certified:
                 raise RequestError(
                     StatusCode.INVALID_MOTION_PLAN,
@@ -362,7 +362,7 @@ class _Job:
             f"{_load_words(load)} ({held or 'empty'})" for held, load in self._loads.items()
         )
         tool = cell.tool.name if cell.tool is not None else "none"
-        margin = 1e3 * self._judge.margin
+        margin = 1e3 * self._evaluator.margin
         lost = (driven[0] - planned[0], driven[1] - planned[1])
         lines = [
             f"cell {cell.name}, robot {cell.robot.name}, tool {tool}, carried: {carried}",
@@ -463,15 +463,15 @@ def _plc_pauses(steps: Sequence[PlannedMovement], times: TransitionTimes) -> dic
     return found
 
 
-def _loads(steps: Sequence[PlannedMovement], judge: Judge) -> dict[str, Payload]:
+def _loads(steps: Sequence[PlannedMovement], evaluator: StepEvaluator) -> dict[str, Payload]:
     """What is carried in the program, by the part that is held, "" for none; the load at the start
     is first.
     """
     found: dict[str, Payload] = {}
     for step, held in zip(steps, _held(steps)[:-1], strict=True):
-        found.setdefault(held, payload_of(judge.scene(step).loads))
+        found.setdefault(held, payload_of(evaluator.scene(step).loads))
     last = _held(steps)[-1]
-    found.setdefault(last, payload_of(judge.scene(steps[-1]).cell.loads(last)))
+    found.setdefault(last, payload_of(evaluator.scene(steps[-1]).cell.loads(last)))
     return found
 
 
@@ -503,7 +503,7 @@ def _numbers(cell: Cell) -> Numbers:
 def _read_back(start: FloatArray, scene: PlanningScene, make: Make) -> ReadBack:
     """Drives the parts of one movement alone, from `start` (n,)."""
 
-    def back(parts: Sequence[Part]) -> list[JointTrajectory]:
+    def back(parts: Sequence[WrittenStatement]) -> list[JointTrajectory]:
         carried = attached(scene)
         texts = make.written("M", start, parts, carried, [], from_home=False, numbers=Numbers())
         driven = drive(make.followed(texts, scene), scene, scene.cell.machine_home)[0]

@@ -13,7 +13,7 @@ from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.errors import RequestError
 from ir_planner.krl.geometry import Arm, status_turn, tool_in_flange
-from ir_planner.krl.judged import Judge, ReadBack, called, points_of
+from ir_planner.krl.step_evaluation import ReadBack, StepEvaluator, called, points_of
 from ir_planner.krl.strokes import one_after_the_other
 from ir_planner.scene import PlanningScene
 from ir_values.arrays import FloatArray
@@ -46,22 +46,22 @@ class _Driven:
 
 
 def fitted_moves(
-    step: PlannedMovement, judge: Judge, back: ReadBack, style: Style
+    step: PlannedMovement, evaluator: StepEvaluator, back: ReadBack, style: Style
 ) -> list[WrittenMove]:
     """The forms of a movement. Raises RequestError where no chain of them is certified."""
     planned = points_of(step)
-    scene = judge.scene(step)
+    scene = evaluator.scene(step)
     q = planned.sample(np.linspace(0.0, planned.duration, _SAMPLES)).q
     reasons = []
     if step.kind in _SERVICE:
         line = [replace(one, velocity=_TOP) for one in _through(q[[-1]], scene, straight=True)]
-        driven = _judged(line, step, judge, back)
+        driven = _evaluated(line, step, evaluator, back)
         if not driven.reason:
-            return _slowed(driven, step, planned, judge, back).moves
+            return _slowed(driven, step, planned, evaluator, back).moves
     for through in (True, False):
-        driven = _refined(q, step, judge, back, style, through=through)
+        driven = _refined(q, step, evaluator, back, style, through=through)
         if not driven.reason:
-            return _slowed(driven, step, planned, judge, back).moves
+            return _slowed(driven, step, planned, evaluator, back).moves
         reasons.append(driven.reason)
     raise RequestError(
         StatusCode.INVALID_MOTION_PLAN,
@@ -73,20 +73,20 @@ def fitted_moves(
 def _refined(
     q: FloatArray,
     step: PlannedMovement,
-    judge: Judge,
+    evaluator: StepEvaluator,
     back: ReadBack,
     style: Style,
     *,
     through: bool,
 ) -> _Driven:
     """The chain of fewest points of q (N, n) that is certified, driven through or with stops."""
-    scene = judge.scene(step)
+    scene = evaluator.scene(step)
     rows = [0, len(q) - 1]
     while True:
         moves = _through(q[rows[1:]], scene)
         if through and len(moves) > 1:
             moves = _rounded(moves, q[0], scene, style)
-        driven = _judged(moves, step, judge, back)
+        driven = _evaluated(moves, step, evaluator, back)
         if not driven.reason or len(rows) > _POINTS_MAX:
             return driven
         if driven.violation is None:
@@ -134,14 +134,14 @@ def _rounded(
     ]
 
 
-def _judged(
-    moves: list[WrittenMove], step: PlannedMovement, judge: Judge, back: ReadBack
+def _evaluated(
+    moves: list[WrittenMove], step: PlannedMovement, evaluator: StepEvaluator, back: ReadBack
 ) -> _Driven:
     try:
         again = one_after_the_other(back(moves))
     except KrlError as error:
         return _Driven(moves, reason=error.reason)
-    found = judge(again, step)
+    found = evaluator(again, step)
     violation = found.verification.violation
     if violation is None:
         return _Driven(moves, again.duration, found.report.energy)
@@ -151,7 +151,11 @@ def _judged(
 
 
 def _slowed(
-    found: _Driven, step: PlannedMovement, planned: JointTrajectory, judge: Judge, back: ReadBack
+    found: _Driven,
+    step: PlannedMovement,
+    planned: JointTrajectory,
+    evaluator: StepEvaluator,
+    back: ReadBack,
 ) -> _Driven:
     """The same motions at the planned time, where they are quicker, and that costs less."""
     best = found
@@ -161,7 +165,7 @@ def _slowed(
         if seconds > _QUICKER * planned.duration:
             break
         share *= seconds / planned.duration
-        slower = _judged([_at(one, share) for one in found.moves], step, judge, back)
+        slower = _evaluated([_at(one, share) for one in found.moves], step, evaluator, back)
         if slower.reason:
             break
         seconds = slower.seconds

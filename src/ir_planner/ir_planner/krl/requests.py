@@ -32,8 +32,8 @@ from ir_planner.errors import RequestError
 from ir_planner.krl.execution import DrivenStep, Switched, drive
 from ir_planner.krl.export import KrlExport, export
 from ir_planner.krl.geometry import Arm, tool_in_flange
-from ir_planner.krl.judged import judge_of
 from ir_planner.krl.makes import joint_limits
+from ir_planner.krl.step_evaluation import evaluator_of
 from ir_planner.krl.surroundings import Surroundings, wires_of
 from ir_planner.planner import Planner
 from ir_planner.program import Charge, Pause, Scenes, spent
@@ -124,7 +124,7 @@ def evaluate_program(
     times: TransitionTimes,
     plc: Mapping[int, PlcPause] | None = None,
 ) -> EvaluatedProgram:
-    """The program driven from `start` (n,) and judged with S_m `margin` [m]. Raises KrlMotionError.
+    """The program driven from `start` (n,), evaluated with S_m `margin` [m]. Raises KrlMotionError.
 
     A movement may touch what the stations where it begins and ends allow, each in its own zone.
     """
@@ -281,13 +281,15 @@ def export_krl(
             "synchronous",
         )
     scene = planner.scene("")
-    judge = judge_of(movements, planner.cell, scene.power, scene.drives, chosen.safety_distance)
+    evaluator = evaluator_of(
+        movements, planner.cell, scene.power, scene.drives, chosen.safety_distance
+    )
     try:
         return export(
             movements,
             name,
             scene,
-            judge,
+            evaluator,
             planner.heard.transitions,
             style,
             lambda program: surroundings(planner, program),

@@ -14,7 +14,7 @@ from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.errors import RequestError
 from ir_planner.krl.geometry import Arm, tool_in_flange
-from ir_planner.krl.judged import ReadBack
+from ir_planner.krl.step_evaluation import ReadBack
 from ir_planner.scene import PlanningScene
 from ir_values.arrays import FloatArray
 

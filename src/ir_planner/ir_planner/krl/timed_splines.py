@@ -9,8 +9,8 @@ from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.errors import RequestError
-from ir_planner.krl.judged import Judge, ReadBack, called, points_of
 from ir_planner.krl.splines import passing_times
+from ir_planner.krl.step_evaluation import ReadBack, StepEvaluator, called, points_of
 from ir_planner.timing import GRID_S
 from ir_values.arrays import FloatArray
 
@@ -32,17 +32,17 @@ _FINEST = 0.04  # s between points, where more of them no longer help
 _SAMPLES_PER_S = 250
 
 
-def fitted_spline(step: PlannedMovement, judge: Judge, back: ReadBack) -> WrittenSpline:
+def fitted_spline(step: PlannedMovement, evaluator: StepEvaluator, back: ReadBack) -> WrittenSpline:
     """The movement through as many points as it needs, doubled from `_SPACING`, to be certified,
     near to the plan, and hardly slower or dearer. Raises RequestError.
     """
     planned = points_of(step)
-    joules = judge(planned, step).report.energy
+    joules = evaluator(planned, step).report.energy
     count = max(int(np.ceil(planned.duration / _SPACING)), _POINTS_MIN)
     found: list[tuple[float, WrittenSpline]] = []
     reason = ""
     while count <= _POINTS_MAX:
-        fits, reason = _slowed(step, planned, count, judge, back)
+        fits, reason = _slowed(step, planned, count, evaluator, back)
         if fits is not None:
             spline, spent = fits
             longer = spline.seconds / planned.duration
@@ -62,7 +62,11 @@ def fitted_spline(step: PlannedMovement, judge: Judge, back: ReadBack) -> Writte
 
 
 def _slowed(
-    step: PlannedMovement, planned: JointTrajectory, count: int, judge: Judge, back: ReadBack
+    step: PlannedMovement,
+    planned: JointTrajectory,
+    count: int,
+    evaluator: StepEvaluator,
+    back: ReadBack,
 ) -> tuple[tuple[WrittenSpline, float] | None, str]:
     """The movement through `count` points, slowed until it is certified, and its joules; else None,
     and the reason.
@@ -70,7 +74,7 @@ def _slowed(
     slower = 1.0
     reason = ""
     times = np.linspace(0.0, planned.duration, count + 1)
-    passed = passing_times(planned.sample(times).q, times, judge.scene(step))
+    passed = passing_times(planned.sample(times).q, times, evaluator.scene(step))
     for _ in range(_SLOWINGS):
         spline = _spline(step, planned, passed * slower)
         (again,) = back([spline])
@@ -81,7 +85,7 @@ def _slowed(
                 f"with {count} points a joint is {away:.4f} rad off; {DEVIATION_MAX:g} rad are "
                 "allowed",
             )
-        found = judge(again, step)
+        found = evaluator(again, step)
         if found.verification.certified:
             return (spline, found.report.energy), ""
         reason = found.verification.status.message

@@ -1,10 +1,10 @@
-"""Steps of a planned program, each judged as it was planned."""
+"""Evaluation of trajectories as steps of a planned program."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ir_description import Cell, PowerData, ProgramStep, Signal, cell_in
-from ir_krl import Part
+from ir_krl import WrittenStatement
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -13,15 +13,15 @@ from ir_planner.errors import RequestError
 from ir_planner.program import doors_along
 from ir_planner.scene import Drives, PlanningScene, with_parts
 
-ReadBack = Callable[[Sequence[Part]], list[JointTrajectory]]
+ReadBack = Callable[[Sequence[WrittenStatement]], list[JointTrajectory]]
 """The movements of parts as the controller's model drives them, from rest to rest."""
 
-# Steps of a planned program, each judged as it was planned: with its load, its parts where they
+# Steps of a planned program, each evaluated as it was planned: with its load, its parts where they
 # lie, doors as its signals move them, sweeping while they do, and what its station allows.
 
 
 @dataclass(frozen=True, eq=False)
-class Judge:
+class StepEvaluator:
     """Evaluates trajectories as the steps that they belong to: with their load, their parts, their
     station.
 
@@ -40,12 +40,12 @@ class Judge:
         return self.scenes[id(step)]
 
 
-def judge_of(
+def evaluator_of(
     steps: Sequence[PlannedMovement], cell: Cell, power: PowerData, drives: Drives, margin: float
-) -> Judge:
-    """A judge of these steps, S_m `margin` m."""
+) -> StepEvaluator:
+    """The evaluator of these steps, S_m `margin` m."""
     found = zip(steps, scenes_of(steps, cell, power, drives), strict=True)
-    return Judge({id(step): scene for step, scene in found}, margin)
+    return StepEvaluator({id(step): scene for step, scene in found}, margin)
 
 
 def contacts_at(step: PlannedMovement) -> str:

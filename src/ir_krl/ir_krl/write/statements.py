@@ -1,4 +1,4 @@
-"""Parts of a written program: motions, pauses, signals, and what is taken and left."""
+"""Statements of a written program: motions, pauses, signals, and what is taken and left."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class WrittenHandling:
     carried: int
 
 
-Part: TypeAlias = (
+WrittenStatement: TypeAlias = (
     WrittenSpline | WrittenPath | WrittenMove | WrittenPause | WrittenSignals | WrittenHandling
 )
 
