@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import compare
+import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -20,6 +21,7 @@ def compared(*words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.long
 def test_a_checkout_answers_as_itself(tmp_path: Path) -> None:
     file = tmp_path / "compare.json"
     wanted = (

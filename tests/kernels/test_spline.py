@@ -237,9 +237,15 @@ def directions(core: Any) -> int:
     return 2 if core is None else 8
 
 
-@pytest.mark.parametrize("smoothing", [0.0, 300.0])
-@pytest.mark.parametrize("regeneration", REGENERATIONS)
-@pytest.mark.parametrize(("interval", "seed"), [(0.08, 0), (0.3, 1), (0.6, 2)])
+@pytest.mark.parametrize(
+    ("interval", "seed", "regeneration", "smoothing"),
+    # every interval and smoothing with two regenerations and every regeneration with both of them
+    [
+        (interval, seed, REGENERATIONS[(seed + step) % len(REGENERATIONS)], 300.0 * step)
+        for seed, interval in enumerate((0.08, 0.3, 0.6))
+        for step in (0, 1)
+    ],
+)
 def test_derivatives_are_those_of_differences(
     core: Any, interval: float, seed: int, regeneration: Regeneration, smoothing: float
 ) -> None:

@@ -293,17 +293,11 @@ def test_without_a_cycle_time_objective_energy_says_that_it_is_slow() -> None:
     ("cell", "stops", "seed"),
     [
         ("table_columns", ("mid", "tR", "side2", "park"), 16),
-        pytest.param(
-            "cnc_door", ("cnc", "pal", "cncL", "press", "park"), 10, marks=pytest.mark.long
-        ),
-        pytest.param(
-            "table_columns",
-            ("side2", "side1", "mid", "tL", "tR", "park"),
-            21,
-            marks=pytest.mark.long,
-        ),
+        ("cnc_door", ("cnc", "pal", "cncL", "press", "park"), 10),
+        ("table_columns", ("side2", "side1", "mid", "tL", "tR", "park"), 21),
     ],
 )
+@pytest.mark.long
 def test_no_cycle_time_that_the_fastest_program_keeps_is_refused(
     cell: str, stops: tuple[str, ...], seed: int
 ) -> None:

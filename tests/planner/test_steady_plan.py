@@ -178,7 +178,7 @@ def test_one_machine_alone_is_tended_too() -> None:
     assert plan.cycle.period >= 12.0
 
 
-@pytest.mark.parametrize("over", [1.05, 1.5])
+@pytest.mark.parametrize("over", [pytest.param(1.05, marks=pytest.mark.long), 1.5])
 def test_fixed_order_and_no_process_cost_what_a_planned_program_costs(over: float) -> None:
     """One machine that takes no time leaves one order: the cycle is a program of its own period."""
     cell = routed(CELL, ("infeed_pick", "gauge_seat", "outfeed_place"))
@@ -199,6 +199,7 @@ def test_fixed_order_and_no_process_cost_what_a_planned_program_costs(over: floa
     assert plan.joules == pytest.approx(program.report.energy, rel=SETTLED)
 
 
+@pytest.mark.long
 def test_two_units_are_never_dearer_and_every_one_of_their_parts_is_made() -> None:
     cell = routed(CELL, ("infeed_pick", "washer_basket", "gauge_seat", "outfeed_place"))
     planner = Planner(cell, clock=lambda: 0.0)
