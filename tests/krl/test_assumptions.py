@@ -86,6 +86,12 @@ ASSUMED = {
         Effect.PLACES,
     ),
     "home": ("PTP XHOME", "XHOME isn't in the files: the cell's home", Effect.PLACES),
+    "the data of the home form": (
+        "PDAT_ACT=PDEFAULT\nFDAT_ACT=FHOME\nBAS(#PTP_PARAMS,100)\nPTP XHOME C_DIS",
+        "PDEFAULT isn't in the files: as KSS 8.3 and later have it, APO_DIST of 100 mm; older ones "
+        "have 100 %; --set 'PDEFAULT={…}'",
+        Effect.SPEEDS,
+    ),
     "an external axis": (
         "PTP {A1 0,E1 500}\nPTP {A1 10,E1 600}",
         "E1 moves from 500 to 600: external axes aren't modelled, the arm alone is driven",

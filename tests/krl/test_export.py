@@ -27,6 +27,7 @@ from ir_krl import (
     base_numbers,
     check_name,
     follow,
+    frame_numbers,
     parse,
     settings_of,
     tool_numbers,
@@ -377,6 +378,22 @@ def test_numbers_are_refused_with_what_there_is(name: str) -> None:
     tools, sentence = ASKED_WRONGLY[name]
     with pytest.raises(KrlError, match=re.escape(sentence)):
         tool_numbers(FrameNumbers(tools=tools), TOOL, {"": EMPTY, "gear": GEAR})
+
+
+def test_numbers_are_read_from_texts() -> None:
+    """As options and the service give them: of the tool, of it with a part, of machines."""
+    found = frame_numbers(["3", "4=gear"], ["2=lathe"])
+    assert found == FrameNumbers({"": 3, "gear": 4}, {"lathe": 2})
+    wrong = (
+        (["x"], []),
+        (["3", "4"], []),
+        (["3=a", "4=a"], []),
+        ([], ["2"]),
+        (["\N{SUPERSCRIPT TWO}"], []),
+    )
+    for tools, bases in wrong:
+        with pytest.raises(KrlError, match="each once"):
+            frame_numbers(tools, bases)
 
 
 def test_a_program_with_a_gripper_halts_until_it_is_open() -> None:

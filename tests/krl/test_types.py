@@ -120,6 +120,12 @@ KEPT = {  # lines that end in WAIT SEC of one second where they compute as a con
     "the least INT": "n='H80000000'\nIF n==-2147483647-1 THEN\nWAIT SEC 1\nENDIF",
     "a letter's number": 'c=65\nIF c=="A" THEN\nWAIT SEC 1\nENDIF',
     "a letter as a number": 'c="A"\nIF c==65 THEN\nWAIT SEC 1\nENDIF',
+    "a letter in an INT": 'c="7"\nn=c\nWAIT SEC n/55',
+    "a letter in an INT of an array": 's[]="7"\nm[2]=s[1]\nWAIT SEC m[2]/55',
+    "a digit that a text begins with": 's[]="7"\nn=s[1]-48\nWAIT SEC n/7',
+    "the letter behind another": 'c="A"\nc=c+1\nIF c=="B" THEN\nWAIT SEC 1\nENDIF',
+    "letters by their order": 'c="b"\nIF (c>"a") AND (c<99) THEN\nWAIT SEC 1\nENDIF',
+    "a letter among numbers": 'c="3"\nSWITCH c\nCASE 51\nWAIT SEC 1\nENDSWITCH',
     "a text of letters": 's[1]="O"\ns[2]="K"\nIF s[]=="OK" THEN\nWAIT SEC 1\nENDIF',
     "a text that was never set": 'IF s[]=="" THEN\nWAIT SEC 1\nENDIF',
     "the length of a text": 's[]="four"\nWAIT SEC StrLen(s[])/4',
@@ -139,7 +145,7 @@ KEPT = {  # lines that end in WAIT SEC of one second where they compute as a con
 
 @pytest.mark.parametrize("name", KEPT)
 def test_numbers_and_texts_decide_as_on_a_controller(name: str, followed: Follow) -> None:
-    head = "DECL REAL x,y\nDECL INT n\nDECL BOOL b\nDECL CHAR c,s[20]\n"
+    head = "DECL REAL x,y\nDECL INT n,m[2]\nDECL BOOL b\nDECL CHAR c,s[20]\n"
     (wait,) = followed(head + KEPT[name]).commands
     assert isinstance(wait, Wait)
     assert wait.seconds == 1
@@ -153,6 +159,7 @@ STOPPED = {  # what a controller stops at, and what is said
     "a[3]=1": "A[3] isn't in A[2]",
     "n=a[0]": "the first element is [1]",
     "m[2,4]=1": "M[2, 4] isn't in M[2, 3]",
+    "c=256": "a CHAR is from 0 to 255; this one is 256",
     "n=m[2]": "M[2] isn't in M[2, 3]",
     "FILL(a[])": "W[3] isn't in W[2]",
 }
@@ -160,11 +167,11 @@ STOPPED = {  # what a controller stops at, and what is said
 
 @pytest.mark.parametrize("line", STOPPED)
 def test_what_a_variable_cannot_hold_is_refused_at_its_place(line: str) -> None:
-    head = "DEF P( )\nDECL INT n,a[2],m[2,3]\nDECL REAL x\nn=2147483647\n"
+    head = "DEF P( )\nDECL INT n,a[2],m[2,3]\nDECL REAL x\nDECL CHAR c\nn=2147483647\n"
     fill = "DEF FILL(w[]:OUT)\nINT w[]\nINT k\nFOR k=1 TO 3\nw[k]=k\nENDFOR\nEND\n"
     with pytest.raises(KrlRunError, match=re.escape(STOPPED[line])) as caught:
         follow([parse(f"{head}{line}\nEND\n{fill}", "p.src")], *ROBOT)
-    assert caught.value.place.line == (11 if "FILL" in line else 5)
+    assert caught.value.place.line == (12 if "FILL" in line else 6)
 
 
 COUNTED = {  # lines of a loop over I: what it waits for, and what I holds behind it

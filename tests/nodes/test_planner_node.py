@@ -249,17 +249,28 @@ def test_an_exported_program_is_what_its_fields_say(call: Call) -> None:
     assert {mode for one in pauses for mode in one.modes} >= asked
     assert "FUNCTION_BLOCK" in whole.plc_text
     one = moving[0].trajectory_id
-    form = call(ExportProgram, "export_program", trajectory_id=one, name="one", style="krc2")
+    form = call(
+        ExportProgram, "export_program", trajectory_id=one, name="one", style="krc2", tools=["3"]
+    )
     assert form.status.code == Status.SUCCESS, form.status.message
     assert "PTP X" in form.text
+    assert "Tool[3]" in form.text
     assert not form.plc_table
     assert not form.plc_text
     assert form.exported.duration >= form.planned.duration - 0.01
-    for field, wrong in (("style", "kss9"), ("name", "1st"), ("language", "rapid")):
-        chosen = {"trajectory_id": one, "name": "one", field: wrong}
-        refused = call(ExportProgram, "export_program", **chosen)
-        assert refused.status.code != Status.SUCCESS
-        assert wrong in refused.status.message
+    refused: tuple[tuple[str, Any, str], ...] = (
+        ("style", "kss9", "kss9"),
+        ("name", "1st", "1st"),
+        ("language", "rapid", "rapid"),
+        ("tools", ["x"], "--tool x: it is N or N=PART"),
+        ("bases", ["3=nobody"], "--base 3=nobody"),
+        ("numbers_from", "DEFDAT $CONFIG\nENDDAT\n", "$config.dat has no TOOL_DATA"),
+    )
+    for field, wrong, said in refused:
+        chosen = {"trajectory_id": one, "name": "one", "style": "krc2", field: wrong}
+        answer = call(ExportProgram, "export_program", **chosen)
+        assert answer.status.code != Status.SUCCESS
+        assert said in answer.status.message
 
 
 def test_a_program_comes_with_its_savings_and_its_front(

@@ -44,6 +44,7 @@ from ir_krl import (
     Note,
     PlcPause,
     Source,
+    frame_numbers,
     parse,
     plc_input,
     read_plc_table,
@@ -292,6 +293,7 @@ def run_export(arguments: argparse.Namespace) -> int:
         if path.exists():
             raise InputError(f"{path} is there already")
     with sentences(), ProgressLine() as line:
+        asked = _frame_numbers(arguments)
         planner = planner_of(arguments.cell, arguments.power_parameters)
         stations = tuple(arguments.stations)
         check_stations(stations, planner)
@@ -306,7 +308,6 @@ def run_export(arguments: argparse.Namespace) -> int:
         )
         if not plan.status.ok:
             return failed(plan.status.message)
-        asked = _frame_numbers(arguments)
         written = export_krl(planner, plan.movements, source.stem, options, style, asked)
     if written.data:
         write_file(data, written.data, new=True)
@@ -335,23 +336,10 @@ def run_export(arguments: argparse.Namespace) -> int:
 
 
 def _frame_numbers(arguments: argparse.Namespace) -> FrameNumbers:
-    """What the options say of numbers of tools and bases. Raises InputError."""
+    """What the options say of numbers of tools and bases. Raises KrlError."""
     plant = arguments.numbers_from
-    return FrameNumbers(
-        _by_name("--tool", arguments.tool, "N or N=PART"),
-        _by_name("--base", arguments.base, "N=MACHINE"),
-        None if plant is None else parse(_text(plant), plant.name),
-    )
-
-
-def _by_name(option: str, texts: Sequence[str], form: str) -> dict[str, int]:
-    found: dict[str, int] = {}
-    for given in texts:
-        number, _, name = given.partition("=")
-        if not number.isdigit() or (form == "N=MACHINE" and not name) or name in found:
-            raise InputError(f"{option} {given[:40]}: it is {form}, each once")
-        found[name] = int(number)
-    return found
+    given = None if plant is None else parse(_text(plant), plant.name)
+    return frame_numbers(arguments.tool, arguments.base, given)
 
 
 def rows_of(found: EvaluatedProgram) -> list[Row]:

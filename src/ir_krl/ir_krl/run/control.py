@@ -9,7 +9,7 @@ from typing import Any
 from ir_krl.errors import KrlRunError, Place
 from ir_krl.language import Tree, Word, place_of
 from ir_krl.run.commands import Command, Motion, SplineBlock, Stop, Switch, Wait, WaitFor
-from ir_krl.run.expressions import Expressions
+from ir_krl.run.expressions import Expressions, same
 from ir_krl.run.memory import (
     CYCLIC,
     FLAG,
@@ -340,7 +340,7 @@ class Control:
         self._count_exits(tree, open_=open_)
         for case in cases:
             *labels, body = case.children
-            if any(self.expressions.value(label) == value for label in labels):
+            if any(same(self.expressions.value(label), value) for label in labels):
                 self._branch(body, open_=open_)
                 return
         if default is not None:

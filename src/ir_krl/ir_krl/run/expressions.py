@@ -187,7 +187,7 @@ class Expressions:
     def _numbers(self, left: Tree, right: Tree, sign: str) -> tuple[int | float, int | float]:
         values = []
         for side in (left, right):
-            value = self.memory.guess(self.value(side), 0, place_of(side, self.file))
+            value = _counted(self.memory.guess(self.value(side), 0, place_of(side, self.file)))
             number(value, f"an operand of {sign}", place_of(side, self.file))
             values.append(value)
         return _alike(*values)
@@ -216,6 +216,8 @@ class Expressions:
         a, b = _alike(a, b)
         if sign in ("==", "<>"):
             return (a == b) is (sign == "==")
+        a = _counted(a)
+        b = _counted(b)
         return _COMPARED[str(sign)](
             number(a, f"the left of {sign}", place), number(b, f"the right of {sign}", place)
         )
@@ -229,6 +231,17 @@ class Expressions:
             rest = {name: value for name, value in b.fields.items() if name not in FRAME_NAMES}
             result = Structure({**result.fields, **rest}, b.kind or "FRAME")
         return result
+
+
+def same(a: Value, b: Value) -> bool:
+    """Whether two values are equal, as == compares them."""
+    left, right = _alike(a, b)
+    return bool(left == right)
+
+
+def _counted(value: Value) -> Value:
+    """A letter as its number, which it is in sums and comparisons; another value as it is."""
+    return ord(value) if isinstance(value, str) and len(value) == 1 else value
 
 
 def _alike(a: Any, b: Any) -> tuple[Any, Any]:

@@ -286,6 +286,11 @@ def assumed_variables() -> dict[str, Assumption]:
     found["$H_POS"] = Assumption(f"$H_POS {home}", Effect.PLACES)
     apo = "no $APO is set: as BAS(#INITMOV) sets it, 50 % and 3 mm"
     found["$APO"] = Assumption(apo, Effect.SPEEDS)
+    form = (
+        "PDEFAULT isn't in the files: as KSS 8.3 and later have it, APO_DIST of 100 mm; older ones "
+        "have 100 %; --set 'PDEFAULT={…}'"
+    )
+    found["PDEFAULT"] = Assumption(form, Effect.SPEEDS)
     found["$TOOL"] = Assumption("no $TOOL is chosen: the cell's tool", Effect.PLACES)
     found["$BASE"] = Assumption("no $BASE is chosen: the robot's foot", Effect.PLACES)
     for n in range(1, TOOLS + 1):

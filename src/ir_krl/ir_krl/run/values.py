@@ -239,7 +239,9 @@ def _number_as(kind: str, value: int | float) -> Value:
         return real(value)
     if kind == "INT":
         return in_range(rounded(value), Place()) if isinstance(value, float) else value
-    if kind == "CHAR" and isinstance(value, int) and 0 <= value < _LETTERS:
+    if kind == "CHAR" and isinstance(value, int):
+        if not 0 <= value < _LETTERS:
+            raise KrlRunError(f"a CHAR is from 0 to {_LETTERS - 1}; this one is {value}", Place())
         return chr(value)
     return value
 

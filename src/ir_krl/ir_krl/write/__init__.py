@@ -1,7 +1,14 @@
 """Texts of a program: .src and .dat, and the PLC's part of its pauses."""
 
 from ir_krl.write.names import NAME_MAX, Numbers, SignalNames, Wiring, check_name
-from ir_krl.write.numbering import BASES_MAX, Chosen, FrameNumbers, base_numbers, tool_numbers
+from ir_krl.write.numbering import (
+    BASES_MAX,
+    Chosen,
+    FrameNumbers,
+    base_numbers,
+    frame_numbers,
+    tool_numbers,
+)
 from ir_krl.write.plc import PlcPause, plc_input, plc_table, read_plc_table, structured_text
 from ir_krl.write.program import (
     GRIP,
@@ -56,6 +63,7 @@ __all__ = [
     "check_name",
     "check_signal",
     "check_style",
+    "frame_numbers",
     "plc_input",
     "plc_table",
     "read_plc_table",

@@ -45,6 +45,28 @@ class FrameNumbers:
     plant: Source | None = None
 
 
+def frame_numbers(
+    tools: Sequence[str], bases: Sequence[str], plant: Source | None = None
+) -> FrameNumbers:
+    """What texts say: tools "N" or "N=PART", bases "N=MACHINE", the plant's $config.dat. Raises
+    KrlError.
+    """
+    return FrameNumbers(
+        _by_name("tool", tools, "N or N=PART"), _by_name("base", bases, "N=MACHINE"), plant
+    )
+
+
+def _by_name(kind: str, texts: Sequence[str], form: str) -> dict[str, int]:
+    """Numbers by what they are of. Raises KrlError."""
+    found: dict[str, int] = {}
+    for given in texts:
+        number, _, name = given.partition("=")
+        if not number.isdecimal() or (kind == "base" and not name) or name in found:
+            raise KrlError(f"--{kind} {given[:40]}: it is {form}, each once")
+        found[name] = int(number)
+    return found
+
+
 @dataclass(frozen=True)
 class Chosen:
     """A number, and why it was taken."""

@@ -19,6 +19,8 @@ from ir_krl import (
     SignalRange,
     Source,
     follow,
+    frame_numbers,
+    parse,
 )
 from ir_krl.urscript import follow_urscript
 from ir_msgs_py.modes import TransitionTimes
@@ -297,6 +299,16 @@ def export_krl(
         )
     except KrlError as error:
         raise RequestError(StatusCode.INVALID_MOTION_PLAN, str(error)) from error
+
+
+def numbers_asked(tools: Sequence[str], bases: Sequence[str], plant: str) -> FrameNumbers:
+    """Numbers of inline forms as `frame_numbers` takes them; plant: text of the plant's
+    $config.dat, or "". Raises RequestError.
+    """
+    try:
+        return frame_numbers(tools, bases, parse(plant, "$config.dat") if plant else None)
+    except KrlError as error:
+        raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, str(error)) from error
 
 
 def one_movement(planner: Planner, trajectory_id: str) -> tuple[PlannedMovement, ...]:

@@ -18,7 +18,7 @@ from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.errors import CancelledError, PlannerError, RequestError
-from ir_planner.krl import export_krl, one_movement
+from ir_planner.krl import export_krl, numbers_asked, one_movement
 from ir_planner.node.answers import (
     fill_cartesian,
     fill_escape,
@@ -353,7 +353,10 @@ class Requests:
             movements = self.planner.programs.get(request.program_id).movements
         else:
             movements = one_movement(self.planner, request.trajectory_id)
-        written = export_krl(self.planner, movements, request.name, style=request.style)
+        numbers = numbers_asked(request.tools, request.bases, request.numbers_from)
+        written = export_krl(
+            self.planner, movements, request.name, style=request.style, numbers=numbers
+        )
         fill_export(response, written)
         return Status.success(written.remark)
 
