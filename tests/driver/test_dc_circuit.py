@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 
 from ir_kernels.power import REGENERATIONS, DcBusParameters, Regeneration, dc_bus
 from ir_sim_driver.plant.plant_parameters import LinkFigures
-from ir_sim_driver.plant.power_meter import DcCircuit
+from ir_sim_driver.plant.power_meter import PRECHARGE, DcCircuit
 
 DT = 0.001
 IDEAL_CHOPPER = LinkFigures(1.33e-3, 560.0, 688.0, 688.0, 11.0, 0.0, 0.0)
@@ -69,6 +70,50 @@ def test_many_steps_at_once_are_the_steps_one_by_one(
     scale = 1.0 + DT * np.abs(powers).sum()
     np.testing.assert_allclose(together, single, rtol=1e-9, atol=1e-9 * scale)
     assert once.stored == pytest.approx(each.stored, abs=1e-9 * scale)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    figures=links(),
+    powers=POWERS,
+    rate=st.floats(1e-4, 1.0),
+    steps=st.integers(1, 400_000),
+    regeneration=st.sampled_from(REGENERATIONS),
+)
+def test_what_is_lost_while_the_bus_is_off_is_charged_again(
+    figures: LinkFigures,
+    powers: list[list[float]],
+    rate: float,
+    steps: int,
+    regeneration: Regeneration,
+) -> None:
+    """A resistor across the capacitor, then the mains through another: charge times their voltage
+    is drawn, whatever both resistances.
+    """
+    circuit = DcCircuit(replace(figures, discharge_rate=rate), DT, regeneration)
+    for row in powers:
+        circuit.step(row)
+    before = circuit.stored
+    volts = circuit.voltage
+    bled = circuit.off(steps)
+    left = volts * math.exp(-rate * steps * DT)
+    assert circuit.voltage == pytest.approx(left, rel=1e-6, abs=1e-3)
+    assert bled == pytest.approx(before - circuit.stored, rel=1e-9, abs=1e-9)
+    supplied = 0.0
+    lost = 0.0
+    for _ in range(round(PRECHARGE / DT) + 1):
+        flows = circuit.step([0.0] * 6)
+        assert flows.dissipated == 0.0
+        supplied += flows.supplied
+        lost += flows.rectifier
+    taken = figures.capacitance * figures.mains * max(figures.mains - left, 0.0)
+    scale = figures.capacitance * figures.mains**2
+    assert supplied - bled == pytest.approx(circuit.stored - before, abs=1e-9 * scale)
+    assert circuit.stored >= 0.0
+    bare = figures.rectifier_drop == figures.rectifier_resistance == 0.0
+    assert supplied + lost >= taken - 1e-9 * scale
+    if bare:
+        assert supplied + lost == pytest.approx(taken, abs=1e-6 * scale)
 
 
 @settings(max_examples=100, deadline=None)

@@ -152,6 +152,8 @@ def keep_the_laws(make, plan, start, sequence):
             reading.base_energy
             + reading.axis_energy.sum()
             + reading.burnt_energy
+            + reading.bled_energy
+            + reading.rectifier_energy
             + reading.capacitor_energy
         )
         assert reading.energy == pytest.approx(parts, rel=1e-9, abs=1e-6)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import pytest
 
+from ir_description import load_power_data
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import OperatingMode
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import RequestRefusedError
-from ir_sim_driver.power import IdleTimes, best_mode, energy_of
+from ir_sim_driver.power import IdleTimes, best_mode, charging_of, energy_of
+
+CHARGING = charging_of(load_power_data().dc_link)
 
 
 def by_mode(simulation):
@@ -30,25 +33,27 @@ def test_times_and_numbers_are_those_of_the_controller(make):
 
 @pytest.mark.parametrize(
     ("start_mode", "bus_power_off", "hibernation"),
-    [("STAND_ON_MOTORS", 98.0, 1012.0), ("STAND_ON_BRAKES", 88.0, 778.0)],
+    [("STAND_ON_MOTORS", 99.8, 1012.1), ("STAND_ON_BRAKES", 90.4, 778.4)],
 )
 def test_break_even_of_the_tool_of_table_2(make, start_mode, bus_power_off, hibernation):
     simulation = make(controller=ControllerSettings(start_mode=start_mode))
     modes = by_mode(simulation)
-    assert modes[Mode.BUS_POWER_OFF].break_even == pytest.approx(bus_power_off, abs=1.0)
-    assert modes[Mode.HIBERNATION].break_even == pytest.approx(hibernation, abs=1.0)
+    assert modes[Mode.BUS_POWER_OFF].break_even == pytest.approx(bus_power_off, abs=0.1)
+    assert modes[Mode.HIBERNATION].break_even == pytest.approx(hibernation, abs=0.1)
 
 
 @pytest.mark.parametrize(
     ("pause", "mode"),
-    [(1.0, 0), (1.9, 0), (5.0, 2), (97.0, 2), (99.0, 3), (1011.0, 3), (1013.0, 4)],
+    [(1.0, 0), (1.9, 0), (5.0, 2), (99.0, 2), (100.5, 3), (1011.0, 3), (1013.0, 4)],
 )
 def test_the_chosen_mode_takes_least_energy(make, pause, mode):
     table = make().pauses.query_modes()
-    chosen = best_mode(table, pause)
+    chosen = best_mode(table, pause, CHARGING)
     assert chosen.mode == mode
     fitting = [each for each in table if pause >= each.time_min_pause]
-    assert energy_of(chosen, pause) == min(energy_of(each, pause) for each in fitting)
+    assert energy_of(chosen, pause, CHARGING) == min(
+        energy_of(each, pause, CHARGING) for each in fitting
+    )
 
 
 def test_a_mode_costs_what_query_modes_said(make):
@@ -64,7 +69,7 @@ def test_a_mode_costs_what_query_modes_said(make):
     after = simulation.mains.meter.reading()
     assert simulation.modes.mode is Mode.STAND_ON_MOTORS
     assert after.energy - before.energy == pytest.approx(
-        energy_of(bus, after.time - before.time), rel=5e-3
+        energy_of(bus, after.time - before.time, CHARGING), rel=5e-3
     )
 
 

@@ -19,7 +19,7 @@ from ir_planner.program.pauses import Step, rests_at
 from ir_planner.program.standby import advice, lengths_of, plan_standby
 from ir_planner.scene import scene_with
 from ir_sim_driver.controller.settings import SimulationSettings
-from ir_sim_driver.controller.simulation import make_simulation
+from ir_sim_driver.controller.simulation import Simulation, make_simulation
 from ir_sim_driver.power import IdleTimes
 from ir_values.arrays import FloatArray
 
@@ -145,3 +145,44 @@ def followed(case: Case, steps: tuple[Step, ...], pause: float) -> tuple[float, 
         assert plant.time - pause < 1000.0, plant.fault
     delay = plant.time - pause
     return plant.mains.energy() - begun, delay if delay > 2.0 * DEBOUNCE else 0.0
+
+
+def rested(plant: Simulation, mode: str, wake_at: float) -> float:
+    """Energy [J] of a pause that a PLC spends in one mode until a time [s], and of the waking."""
+    plant.run(0.1)
+    begun = plant.mains.energy()
+    plant.plc.set_bit(BITS[mode], True)
+    plant.run(wake_at)
+    if mode == "HIBERNATION":
+        plant.wake()
+    plant.plc.set_bit(BITS[mode], False)
+    plant.run(plant.modes.times[Mode[mode]].leave + 1.0)
+    assert plant.modes.motors_on
+    plant.mains.settle()
+    return plant.mains.energy() - begun
+
+
+@pytest.mark.parametrize(
+    ("mode", "wake_at"),
+    [("BUS_POWER_OFF", 6.0), ("BUS_POWER_OFF", 90.0), ("HIBERNATION", 400.0)],
+)
+def test_charging_the_dc_link_again_costs_what_was_planned_and_nothing_is_lost(
+    mode: str, wake_at: float
+) -> None:
+    """Against the same pause of a link that keeps its charge."""
+    cases = {}
+    for discharge in (POWER.dc_link.discharge, None):
+        power = replace(POWER, dc_link=replace(POWER.dc_link, discharge=discharge))
+        plant = make_simulation(CELL, NO_LOAD, "ideal", SimulationSettings(dt=DT), power)
+        energy = rested(plant, mode, wake_at)
+        read = plant.mains.meter.reading()
+        parts = (read.base_energy, read.axis_energy.sum(), read.burnt_energy, read.bled_energy)
+        stored = read.rectifier_energy + read.capacitor_energy
+        assert read.energy == pytest.approx(sum(parts) + stored, rel=1e-12)
+        assert read.capacitor_energy == 0.0
+        rests = rests_at(plant.backend.q, scene_with(CELL, NO_LOAD, power), TransitionTimes())
+        leave = rests.named(mode).leave
+        cases[discharge] = energy, rests.in_time((rests.named(mode),), wake_at + leave)
+    driven, planned = np.subtract(cases[POWER.dc_link.discharge], cases[None])
+    assert driven == pytest.approx(planned, rel=0.01, abs=0.2)
+    assert driven > 5.0

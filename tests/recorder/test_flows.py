@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ir_msgs_py.modes import Mode
 from ir_recorder import Analysis, analyse
 from ir_recorder.analysis.flows import EnergyFlows, energy_flows
 from ir_recorder.analysis.production import levers
@@ -119,3 +120,31 @@ def test_every_node_gives_what_it_takes(
     assert "nan" not in drawn
     heights = [float(high) for high in re.findall(r'<rect[^>]* height="([\d.]+)"', drawn)]
     assert max(heights) <= TALL + 0.1
+
+
+def test_what_bleed_resistors_take_is_not_counted_as_stored(analysis: Analysis) -> None:
+    """A bus that falls while it is off, and is charged again from the mains at the end."""
+    power = analysis.recording.power
+    assert power is not None
+    n = len(power.time)
+    volts = np.full(n, 560.0)
+    k = np.arange(n)
+    fall = (k > n // 4) & (k < n // 2)
+    volts[fall] *= np.exp(-np.linspace(0.0, 2.0, fall.sum()))
+    mode = np.where(fall, int(Mode.BUS_POWER_OFF), power.mode)
+    step = np.diff(power.time, prepend=power.time[:1])
+    joules = 0.5 * 1.33e-3 * 560.0**2 * (1.0 - np.exp(-4.0))
+    charged = power.power.copy()
+    charged[n // 2] += joules / step[n // 2]
+    recharged = replace(power, bus_voltage=volts, mode=mode, power=charged)
+    kept = replace(power, bus_voltage=np.full(n, 560.0))
+    whole = replace(analysis, steps=())
+    flows = [
+        energy_flows(replace(whole, recording=replace(analysis.recording, power=each)))
+        for each in (recharged, kept)
+    ]
+    assert flows[0] is not None
+    assert flows[1] is not None
+    assert flows[0].bled == pytest.approx(joules, rel=1e-9)
+    assert flows[1].bled == 0.0
+    assert flows[0].stored == pytest.approx(flows[1].stored, abs=1e-6 * flows[1].mains)

@@ -199,8 +199,12 @@ def _seconds(table: Table, key: str) -> float:
 def dc_link(item: Item) -> DcLink:
     """The drives' bus."""
     table = item.table(
-        ("capacitance_f", "voltage_v", "chopper_on_v", "chopper_off_v", "brake_resistor_ohm")
+        ("capacitance_f", "voltage_v", "chopper_on_v", "chopper_off_v", "brake_resistor_ohm"),
+        ("discharge_s",),
     )
+    discharge = None
+    if "discharge_s" in table:
+        discharge = figure(table["discharge_s"]).number(0, 1e6, "s", above=True)
     with item.blamed():
         return DcLink(
             capacitance=figure(table["capacitance_f"]).number(0, 10, "F", above=True),
@@ -208,6 +212,7 @@ def dc_link(item: Item) -> DcLink:
             chopper_on=figure(table["chopper_on_v"]).number(0, 1e5, "V", above=True),
             chopper_off=figure(table["chopper_off_v"]).number(0, 1e5, "V", above=True),
             brake_resistor=figure(table["brake_resistor_ohm"]).number(0, 1e6, "ohm", above=True),
+            discharge=discharge,
         )
 
 

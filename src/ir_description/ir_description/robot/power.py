@@ -39,7 +39,7 @@ class ControllerMode:
 @dataclass(frozen=True)
 class DcLink:
     """Bus of the drives: the supply rectifies only; what the capacitors cannot take is
-    dissipated.
+    dissipated. Where the drive bus is off the capacitors' voltage falls through bleed resistors.
     """
 
     capacitance: float  # F
@@ -47,10 +47,13 @@ class DcLink:
     chopper_on: float  # V
     chopper_off: float  # V
     brake_resistor: float  # ohm
+    discharge: float | None = None  # s, time constant of the voltage; None: the charge is kept
 
     def __post_init__(self) -> None:
         for name, unit in (("capacitance", "F"), ("voltage", "V"), ("brake_resistor", "ohm")):
             in_range(getattr(self, name), 0.0, 1e6, unit, name, open_low=True)
+        if self.discharge is not None:
+            in_range(self.discharge, 0.0, 1e6, "s", "discharge", open_low=True)
         if not self.voltage < self.chopper_off <= self.chopper_on:
             raise InvalidValueError(
                 f"chopper switches off at {self.chopper_off:g} V and on at {self.chopper_on:g} "
@@ -65,6 +68,11 @@ class DcLink:
             * self.capacitance
             * (self.chopper_on * self.chopper_on - self.voltage * self.voltage)
         )
+
+    @property
+    def discharge_rate(self) -> float:
+        """Share of the voltage that is lost in a second [1/s] where the drive bus is off."""
+        return 0.0 if self.discharge is None else 1.0 / self.discharge
 
 
 @dataclass(frozen=True)

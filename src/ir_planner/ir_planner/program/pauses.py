@@ -4,10 +4,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import combinations
+from typing import TypeVar
 
 import numpy as np
 
-from ir_msgs_py.modes import DEEPER, REST_MODES, TransitionTimes, modes_of
+from ir_msgs_py.modes import DEEPER, DRIVES_ON, REST_MODES, Mode, TransitionTimes, modes_of
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_planner.checks import (
     MovementEnergy,
@@ -27,25 +28,60 @@ from ir_values.arrays import FloatArray
 # standing on motors. A mode can be left, deeper or back to motors, when it was entered and its
 # shortest stay is over. Left alone on motors, the controller closes its brakes after `timer` s.
 # These conventions of the power data decide every break-even.
+#
+# While the drive bus is off the DC link discharges, U falling with e^(-t/T), and waking charges it
+# again: the mains give C U_0 (U_0 - U), of which the precharge resistor keeps C (U_0 - U)^2 / 2.
 
+_Seconds = TypeVar("_Seconds", float, FloatArray)
 MOTORS = "STAND_ON_MOTORS"
 BRAKES = "STAND_ON_BRAKES"
 
 
 @dataclass(frozen=True)
 class Rest:
-    """A mode to rest in: its power [W] and times [s]."""
+    """A mode to rest in: its power [W] and times [s], and whether the drive bus is off in it."""
 
     name: str
     watts: float
     enter: float
     stay: float
     leave: float
+    bus_off: bool = False
 
     @property
     def busy(self) -> float:
         """Seconds from asking for it until it can be left."""
         return self.enter + self.stay
+
+
+@dataclass(frozen=True)
+class Recharge:
+    """What waking takes [J] at the mains to charge the DC link after some time with the drive bus
+    off: whole: from empty; rate [1/s]: by which the voltage falls; none by default.
+    """
+
+    whole: float = 0.0
+    rate: float = 0.0
+
+    @property
+    def rest(self) -> float:
+        """J in the capacitor at the mains' voltage."""
+        return 0.5 * self.whole
+
+    def joules(self, seconds: _Seconds) -> _Seconds:
+        """After so long, begun at the mains' voltage."""
+        return -self.whole * np.expm1(-self.rate * seconds)
+
+    def begun_higher(self, seconds: float, stored: float) -> tuple[float, float]:
+        """After so long, begun with `stored` J above the mains' voltage; and what is left of
+        those.
+        """
+        if not self.whole:
+            return 0.0, stored
+        left = (self.rest + stored) * float(np.exp(-2.0 * self.rate * seconds))
+        if left >= self.rest:
+            return 0.0, left - self.rest
+        return self.whole * (1.0 - float(np.sqrt(left / self.rest))), 0.0
 
 
 @dataclass(frozen=True)
@@ -68,11 +104,14 @@ Steps = tuple[Step, ...]
 
 @dataclass(frozen=True)
 class Rests:
-    """motors: power [W] of standing on motors; timer [s]; modes: the others, shallow to deep."""
+    """motors: power [W] of standing on motors; timer [s]; modes: the others, shallow to deep;
+    recharge: of the DC link, on waking from modes with the drive bus off.
+    """
 
     motors: float
     timer: float
     modes: tuple[Rest, ...]
+    recharge: Recharge = Recharge()
 
     def named(self, name: str) -> Rest:
         """The mode of that name."""
@@ -89,6 +128,16 @@ class Rests:
         awake = max(pause, last.free)
         return self._energy(reached, awake), awake + last.rest.leave - pause
 
+    def mean_cost(self, steps: Steps, pauses: FloatArray) -> float:
+        """Mean of the energies [J] of `cost` over pauses (n,) [s]."""
+        timed = self._with_timer(steps)
+        ends = [*(step.at for step in timed), np.inf]
+        total = self.motors * float(pauses[pauses <= ends[0]].sum())
+        for k, step in enumerate(timed):
+            ended = pauses[(pauses > step.at) & (pauses <= ends[k + 1])]
+            total += float(self._energy(timed[: k + 1], np.maximum(ended, step.free)).sum())
+        return total / len(pauses)
+
     def in_time(self, rests: Sequence[Rest], pause: float) -> float:
         """Energy [J] of a pause of known length [s] with these modes, ready at its end; inf: too
         short.
@@ -97,7 +146,7 @@ class Rests:
         awake = pause - steps[-1].rest.leave
         return self._energy(steps, awake) if awake >= steps[-1].free else float("inf")
 
-    def _energy(self, steps: Steps, awake: float) -> float:
+    def _energy(self, steps: Steps, awake: _Seconds) -> _Seconds:
         """Energy [J] from motors through the steps, woken at a time [s], until the robot is
         ready.
         """
@@ -109,7 +158,10 @@ class Rests:
             energy += watts * (entered - since)
             since = entered
             watts = step.rest.watts
-        return energy + watts * (awake - since) + self.motors * steps[-1].rest.leave
+        energy += self.motors * steps[-1].rest.leave
+        spent = energy + watts * (awake - since)
+        cut = cut_at(steps)
+        return spent if cut is None else spent + self.recharge.joules(awake - cut)
 
     def known(self, pause: float) -> tuple[float, Steps]:
         """Least energy [J] of a pause of known length [s], ready at its end, and the sequence; no
@@ -164,6 +216,11 @@ class Rests:
         )
 
 
+def cut_at(steps: Steps) -> float | None:
+    """When [s] the drive bus is switched off; None: it is not."""
+    return next((step.at + step.rest.enter for step in steps if step.rest.bus_off), None)
+
+
 def at_once(rests: Sequence[Rest]) -> Steps:
     """Each mode as soon as the one before can be left."""
     steps: list[Step] = []
@@ -202,11 +259,26 @@ def _rests_at(posture: tuple[float, ...], scene: PlanningScene, times: Transitio
                 times.enter(name),
                 times.minimum_stay(name),
                 times.leave(name),
+                bus_is_off(name),
             )
             for name in REST_MODES[1:]
             if name in [mode.name for mode in scene.power.modes]
         ),
+        recharge_of(scene),
     )
+
+
+def bus_is_off(name: str) -> bool:
+    """Whether the drive bus is off in a mode."""
+    return Mode[name] not in DRIVES_ON
+
+
+def recharge_of(scene: PlanningScene) -> Recharge:
+    """Of the controller's DC link."""
+    link = scene.power.dc_link
+    if link.discharge is None:
+        return Recharge()
+    return Recharge(link.capacitance * link.voltage**2, link.discharge_rate)
 
 
 # How the energy of a pause changes with each power parameter.
@@ -235,7 +307,7 @@ def same_steps(steps: Steps, rests: Rests) -> Steps:
 
 def _one_watt(rests: Rests, mode: str) -> Rests:
     modes = tuple(replace(rest, watts=float(rest.name == mode)) for rest in rests.modes)
-    return replace(rests, motors=float(mode == MOTORS), modes=modes)
+    return replace(rests, motors=float(mode == MOTORS), modes=modes, recharge=Recharge())
 
 
 def _mode_slope(mode: str, q: FloatArray, scene: PlanningScene) -> FloatArray:
@@ -337,7 +409,8 @@ def _spent(pause: Pause, mode: str, rests: Rests) -> PlannedMovement:
 # The charge of the DC link's capacitor, carried from step to step of a program.
 #
 # A movement leaves what its braking gave, the next one takes it first. While the motors hold the
-# arm the charge feeds the holding torque; with the brakes closed it stays.
+# arm the charge feeds the holding torque; with the brakes closed it stays, and where the drive bus
+# is off it goes first through the bleed resistors.
 
 
 class Charge:
@@ -371,21 +444,33 @@ class Charge:
         return energy
 
     def stood(self, step: PlannedMovement, pause: Pause) -> PlannedMovement:
-        """The step of a pause, whose holding torque takes the charge first."""
+        """The step of a pause, whose holding torque takes the charge first; what is still there
+        when the drive bus is switched off need not be charged again until it has gone too.
+        """
         scene = pause.scene
-        watts = holding_watts(pause.q, scene) - scene.base_watts
-        fed = min(self.stored, max(watts, 0.0) * self._holding(step, pause))
-        self.stored -= fed
+        watts = max(holding_watts(pause.q, scene) - scene.base_watts, 0.0)
+        rests = rests_at(pause.q, scene, self._times)
+        steps = at_once([rests.named(mode.name) for mode in modes_of(step.power_mode)])
+        if not steps:  # the controller's own timer closes the brakes long after the charge has gone
+            saved = self._held(watts * pause.seconds)
+        else:
+            waking = steps[-1].rest.leave
+            cut = cut_at(steps)
+            saved = self._held(watts * min(steps[0].rest.enter, pause.seconds))
+            if cut is not None:
+                saved += self._bled(rests.recharge, pause.seconds - waking - cut)
+            saved += self._held(watts * min(waking, pause.seconds))
         report = step.report
-        energy = report.energy - fed
+        energy = report.energy - saved
         return replace(step, report=replace(report, energy=energy, base_energy=energy))
 
-    def _holding(self, step: PlannedMovement, pause: Pause) -> float:
-        """How long the motors hold the arm [s]; the controller's own timer closes the brakes long
-        after the charge has gone.
-        """
-        modes = modes_of(step.power_mode)
-        times = self._times
-        if not modes:
-            return pause.seconds
-        return min(times.enter(modes[0].name) + times.leave(modes[-1].name), pause.seconds)
+    def _held(self, joules: float) -> float:
+        """What the charge gives of the joules of a holding torque."""
+        fed = min(self.stored, joules)
+        self.stored -= fed
+        return fed
+
+    def _bled(self, recharge: Recharge, off: float) -> float:
+        """What the charge saves [J] of charging again after `off` s without the drive bus."""
+        joules, self.stored = recharge.begun_higher(off, self.stored)
+        return recharge.joules(off) - joules

@@ -19,8 +19,11 @@ from ir_planner.program.pauses import (
     Rests,
     Step,
     Steps,
+    at_once,
+    bus_is_off,
     mode_watts,
     pause_slope,
+    recharge_of,
     rests_at,
     same_steps,
 )
@@ -34,6 +37,7 @@ PAUSE_MAX = 604_800.0  # s: a week
 SAMPLES_MAX = 10_000  # planned in 40 ms of processor time
 # equally likely lengths that quantiles are taken as: the mean of a law with jumps to 0.1 %
 _BETWEEN = 1000
+_ROUNDS = 50  # of a break-even whose cost depends on it: far more than any needs
 
 _NONE: FloatArray = np.zeros(0)
 
@@ -131,17 +135,35 @@ def _refused(sentence: str) -> RequestError:
 # the pauses longer than that), at the controller's own timer, or at the moment when the mode before
 # can be left. Over these times the policy is found backwards, mode
 # by mode, by dynamic programming: exact, in n log n.
+#
+# But for what charges the DC link again, which depends on how long the drive bus was off: it is
+# counted as nothing and as a whole charge, and the better of both policies is taken, or one mode
+# alone: at most a whole charge (0.4 kJ) above the least expectation.
 
 
 @dataclass(frozen=True, eq=False)
 class Timeouts:
-    """Policies for the modes of `rests` and lengths (n,) [s], sorted."""
+    """Policies for the modes of `rests` and lengths (n,) [s], sorted; switched_off [J]: what
+    switching the drive bus off counts in the search.
+    """
 
     rests: Rests
     lengths: FloatArray
+    switched_off: float = 0.0
 
     def best(self) -> Steps:
         """The policy of least expected energy."""
+        steps = self._searched()
+        whole = self.rests.recharge.whole
+        if not whole:
+            return steps
+        other = replace(self, switched_off=whole)._searched()
+        alone = [at_once((rest,)) for rest in self.rests.modes]
+        policies = (steps, other, *alone, Steps())
+        return min(policies, key=lambda each: self.rests.mean_cost(each, self.lengths))
+
+    def _searched(self) -> Steps:
+        """The policy that the search finds."""
         steps = self._first()
         while steps and (following := self._next(steps[-1])) is not None:
             steps = (*steps, following)
@@ -157,7 +179,7 @@ class Timeouts:
             best = self._until(np.array([lengths[-1]]), rests.motors, 0.0)[0], Steps()
         for rest in rests.modes:
             at = np.append(times, rests.timer) if rest.name == BRAKES else times
-            costs = self._until(at, rests.motors, 0.0) + self._from(at, rest, rests.motors)
+            costs = self._until(at, rests.motors, 0.0) + self._from(at, rest, rests.motors, False)
             k = int(np.argmin(costs))
             if rest.watts <= rests.motors and costs[k] < best[0]:
                 best = float(costs[k]), (Step(rest, float(at[k])),)
@@ -171,7 +193,8 @@ class Timeouts:
         least = self._until(lengths[-1:], rest.watts, rest.leave)[0]
         best = None
         for deeper in self._deeper(rest):
-            costs = self._until(at, rest.watts, rest.leave) + self._from(at, deeper, rest.watts)
+            costs = self._until(at, rest.watts, rest.leave)
+            costs += self._from(at, deeper, rest.watts, rest.bus_off)
             k = int(np.argmin(costs))
             if self._longer(at)[k] and costs[k] < least:
                 least = costs[k]
@@ -203,13 +226,15 @@ class Timeouts:
         back: FloatArray = ended * (self.rests.motors * leave)
         return staying + back
 
-    def _from(self, times: FloatArray, rest: Rest, watts: float) -> FloatArray:
+    def _from(self, times: FloatArray, rest: Rest, watts: float, was_off: bool) -> FloatArray:
         """Least energy, of all pauses that are longer, of entering a mode at each of these times
-        from one that draws `watts`, until the robot is ready.
+        from one that draws `watts`, until the robot is ready; was_off: whether the drive bus is off
+        before.
         """
         longer = self._longer(times)
         free = times + rest.busy
-        entering = longer * (watts * rest.enter + rest.watts * rest.stay)
+        switched = self.switched_off if rest.bus_off and not was_off else 0.0
+        entering = longer * (watts * rest.enter + rest.watts * rest.stay + switched)
         early = (longer - self._longer(free)) * (self.rests.motors * rest.leave)
         return entering + early + self._after(free, rest)
 
@@ -231,7 +256,9 @@ class Timeouts:
         end.
         """
         staying = self._until(times, rest.watts, rest.leave)
-        options = [self._from(times, deeper, rest.watts) for deeper in self._deeper(rest)]
+        options = [
+            self._from(times, deeper, rest.watts, rest.bus_off) for deeper in self._deeper(rest)
+        ]
         nobody = self._longer(times) == 0
         onward: FloatArray = np.min(options, axis=0) if options else np.full(len(times), np.inf)
         return staying + np.where(nobody, 0.0, onward)
@@ -359,7 +386,7 @@ def advice(
     rests = rests_at(q, scene, times)
     pause = lengths.most
     steps, cost = _known(rests, pause) if lengths.known else _policy(rests, lengths)
-    by_itself = _mean(rests, (), lengths)
+    by_itself = rests.mean_cost((), lengths.likely)
     modes, switches = _shown(rests, steps, pause)
     chosen = steps[-1].rest.name if steps else MOTORS
     saving = by_itself - cost.expected
@@ -392,8 +419,8 @@ def _saved_within(
         if lengths.known and own:
             spent = of.in_time([step.rest for step in own], lengths.most)
         else:
-            spent = _mean(of, own, lengths)
-        return _mean(of, (), lengths) - spent
+            spent = of.mean_cost(own, lengths.likely)
+        return of.mean_cost((), lengths.likely) - spent
 
     return interval(saving, spread(pause_slope(q, scene, rests, saved), scene.parameters))
 
@@ -426,17 +453,16 @@ def _policy(rests: Rests, lengths: Lengths) -> tuple[Steps, _Cost]:
     return steps, _Cost(float(expected), float(worst[0]), clairvoyant, float(late), float(worst[1]))
 
 
-def _mean(rests: Rests, steps: Steps, lengths: Lengths) -> float:
-    return float(np.mean([rests.cost(steps, float(pause))[0] for pause in lengths.likely]))
-
-
 def _alone(rests: Rests, lengths: Lengths, by_itself: float) -> tuple[float, ...]:
     """Energies [J] of every mode alone, asked for at once; inf where a pause of known length is too
     short.
     """
     if lengths.known:
         return (by_itself, *(rests.in_time((rest,), lengths.most) for rest in rests.modes))
-    return (by_itself, *(_mean(rests, (Step(rest, 0.0),), lengths) for rest in rests.modes))
+    return (
+        by_itself,
+        *(rests.mean_cost((Step(rest, 0.0),), lengths.likely) for rest in rests.modes),
+    )
 
 
 def _shown(rests: Rests, steps: Steps, most: float) -> tuple[tuple[str, ...], tuple[float, ...]]:
@@ -465,7 +491,7 @@ def _mode(name: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes
         regular_time_to_operate=leave,
         time_min_length_of_stay=stay,
         energy_to_pause=motors * enter,
-        energy_to_operate=motors * leave,
+        energy_to_operate=motors * leave + (recharge_of(scene).whole if bus_is_off(name) else 0.0),
         break_even=break_even(name, q, scene, times),
     )
 
@@ -494,8 +520,18 @@ def break_even(name: str, q: FloatArray, scene: PlanningScene, times: Transition
     gain = watts[0] - watts[1]
     if gain <= 0.0:
         return float("inf")
+    recharge = recharge_of(scene)
+
+    def charged(mode: str, pause: float) -> float:
+        off = pause - times.enter(mode) - times.leave(mode)
+        return recharge.joules(max(off, 0.0)) if bus_is_off(mode) else 0.0
+
+    pays = (extra[1] - extra[0]) / gain
+    for _ in range(_ROUNDS):  # charging the DC link costs more after longer pauses, up to a bound
+        more = charged(deeper, pays) - charged(shallower, pays)
+        pays = (extra[1] - extra[0] + more) / gain
     shortest = times.enter(deeper) + times.minimum_stay(deeper) + times.leave(deeper)
-    return max((extra[1] - extra[0]) / gain, shortest)
+    return float(max(pays, shortest))
 
 
 # Where to wait: at which of some postures a pause costs least, moving there and back included.

@@ -8,10 +8,12 @@ import numpy as np
 
 from ir_description import Cell
 from ir_kernels import DynamicsModel
+from ir_msgs_py.modes import RESTS
 from ir_recorder.analysis.loads import carried
+from ir_recorder.analysis.predicted_power import recorded_link, recorded_power_data
 from ir_recorder.analysis.results import NAN, Analysis, StepResult
 from ir_recorder.reading.recording import JointSeries
-from ir_values.arrays import FloatArray
+from ir_values.arrays import BoolArray, FloatArray
 
 # Where the joules of a run go: from the mains to controller, tool, axes, brake resistor; what
 # comes back.
@@ -30,10 +32,11 @@ class EnergyFlows:
     recorded.
 
     mains = controller + tool + rectifier + from_mains; from_mains + returned = taken + resistor +
-    stored.
+    bled + stored.
     taken, returned: by accelerating and by braking axes, each counted for itself; stored: left in
-    the capacitors. motors: electrical losses of motors and inverters. lifted, lowered: work into
-    and out of gravity and counterbalance; friction: mechanical work that neither keeps.
+    the capacitors; bled: by their bleed resistors while the drive bus was off. motors: electrical
+    losses of motors and inverters. lifted, lowered: work into and out of gravity and
+    counterbalance; friction: mechanical work that neither keeps.
     """
 
     mains: float
@@ -46,6 +49,7 @@ class EnergyFlows:
     motors: float
     lifted: float
     lowered: float
+    bled: float = 0.0
 
     @property
     def from_mains(self) -> float:
@@ -55,7 +59,7 @@ class EnergyFlows:
     @property
     def stored(self) -> float:
         """What the capacitors hold more at the end than at the start."""
-        return self.from_mains + self.returned - self.taken - self.resistor
+        return self.from_mains + self.returned - self.taken - self.resistor - self.bled
 
     @property
     def friction(self) -> float:
@@ -100,7 +104,26 @@ def energy_flows(analysis: Analysis) -> EnergyFlows | None:
         motors=taken - returned - work,
         lifted=lifted,
         lowered=lowered,
+        bled=_bled(analysis, inside),
     )
+
+
+def _bled(analysis: Analysis, inside: BoolArray) -> float:
+    """J that the capacitors lost in readings with the drive bus off, by the bus voltage: in a rest
+    without it, and wherever the mains would have kept the voltage up.
+    """
+    recording = analysis.recording
+    power = recording.power
+    if power is None or not (power.bus_voltage > 0.0).any():
+        return 0.0
+    data = recorded_power_data(recording, analysis.cell)[0]
+    link = recorded_link(recording, data)
+    off = np.isin(power.mode, [int(row.mode) for row in RESTS if not row.drives_on])
+    volts = np.nan_to_num(power.bus_voltage)
+    held = np.where(off, volts, np.minimum(volts, link.voltage))
+    before = np.concatenate((held[:1], np.where(off[1:], volts[:-1], held[:-1])))
+    fallen = 0.5 * link.capacitance * (before**2 - held**2)
+    return float(np.maximum(fallen[inside], 0.0).sum())
 
 
 def _span(analysis: Analysis) -> tuple[float, float]:

@@ -72,6 +72,7 @@ def rows(flows: EnergyFlows) -> list[tuple[str, str, float]]:
         ("DC bus", "axes", flows.taken),
         ("DC bus", "brake resistor", flows.resistor),
         ("DC bus", "capacitors", flows.stored),
+        *([("DC bus", "bleed resistors", flows.bled)] if flows.bled else []),
         ("axes", "back to the DC bus", flows.returned),
     ]
     if flows.split:

@@ -7,7 +7,7 @@ import numpy as np
 from ir_description import PowerData
 from ir_kernels.dynamics import DynamicsModel
 from ir_kernels.power import Regeneration
-from ir_msgs_py.modes import Mode
+from ir_msgs_py.modes import DRIVES_ON, Mode
 from ir_sim_driver.plant import Backend, BasePower, Carried, Plant, PowerMeter, standing_watts
 
 _SETTLE_STEPS = 250  # at the latest: arrays of many steps cost what arrays of few do
@@ -67,6 +67,7 @@ class Mains:
                 level is Mode.STAND_ON_MOTORS,
                 self._steps,
                 whole=whole is not None,
+                drive_bus=level in DRIVES_ON,
             )
             self._steps = 0
 

@@ -10,7 +10,15 @@ from ir_msgs_py.status import StatusCode
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.plc import OFF_BIT, Plc
-from ir_sim_driver.power import PAUSE_MAX, Demand, PowerModes, best_route, mode_table
+from ir_sim_driver.power import (
+    PAUSE_MAX,
+    Charging,
+    Demand,
+    PowerModes,
+    best_route,
+    mode_table,
+    uncharged,
+)
 
 # Latched requests: drives off, recovery, cold start, waking.
 
@@ -81,7 +89,8 @@ class Pauses:
     """PROFIenergy's commands on the power modes.
 
     wants_motors: a pause was ended, motors are asked for. power: watts at the mains in a mode with
-    the present load and posture; pe_ids: PROFIenergy's numbers.
+    the present load and posture; pe_ids: PROFIenergy's numbers; charging: J for
+    the DC link after a time without the drive bus.
     """
 
     def __init__(
@@ -90,9 +99,11 @@ class Pauses:
         plc: Plc,
         power: Callable[[Mode], float],
         pe_ids: Mapping[Mode, int],
+        charging: Charging = uncharged,
     ) -> None:
         self._modes = modes
         self._plc = plc
+        self._charging = charging
         self._power = power
         self._pe_ids = pe_ids
         self._route: tuple[Mode, ...] = ()
@@ -140,7 +151,7 @@ class Pauses:
         times = {mode: rest for mode, rest in self._modes.times.items() if mode in self._pe_ids}
         if self._plc.no_hibernation:
             times = {mode: rest for mode, rest in times.items() if mode is not Mode.HIBERNATION}
-        return mode_table(times, self._power, self._pe_ids, source)
+        return mode_table(times, self._power, self._pe_ids, source, self._charging)
 
     def start(self, pause: float, executing: bool) -> PowerMode:
         """Start_Pause of `pause` [s] from now: go through the modes that take least energy; the
@@ -159,7 +170,7 @@ class Pauses:
             raise RequestRefusedError(StatusCode.INVALID_ROBOT_STATE, f"no pause: {reason}")
         source = self._modes.target if self._route else self._modes.level
         table = self._entered_from(source)
-        route = best_route(table, pause, source, self._power(source))
+        route = best_route(table, pause, source, self._power(source), self._charging)
         stays = () if source is Mode.STAND_ON_MOTORS else (source,)
         self._route = tuple(mode.mode for mode in route) or self._route or stays
         deepest = self._route[-1] if self._route else Mode.STAND_ON_MOTORS
@@ -195,7 +206,7 @@ class ModeControl:
     """Decides about the power modes of one controller.
 
     power: watts at the mains in a mode with the present load and posture; pe_ids: PROFIenergy's
-    numbers.
+    numbers; charging: J for the DC link after a time without the drive bus.
     """
 
     def __init__(
@@ -204,13 +215,14 @@ class ModeControl:
         plc: Plc,
         power: Callable[[Mode], float],
         pe_ids: Mapping[Mode, int],
+        charging: Charging = uncharged,
     ) -> None:
         self._enabling_switch = settings.controller.enabling_switch
         self._plc = plc
         self.modes = PowerModes(
             settings.transitions, settings.idle, settings.controller.rest_at_start
         )
-        self.pauses = Pauses(self.modes, plc, power, pe_ids)
+        self.pauses = Pauses(self.modes, plc, power, pe_ids, charging)
         self.latches = Latches()
         self._operating_mode = plc.operating_mode
         self._demand = Demand()

@@ -52,7 +52,7 @@ from ir_sim_driver.plant import (
     plant_named,
 )
 from ir_sim_driver.plc import Plc, Watchdog
-from ir_sim_driver.power import IdleTimes
+from ir_sim_driver.power import IdleTimes, charging_of
 from ir_values.arrays import FloatArray
 
 # Outcomes of goals: energy, load finding and contact.
@@ -184,7 +184,8 @@ class Simulation:
         )
         self.plc = Plc(settings.plc, self.notices, settings.controller.mode_switch)
         pe_ids = {Mode[mode.name]: mode.pe_mode_id for mode in data.modes}
-        self.control = ModeControl(settings, self.plc, self.standing_power, pe_ids)
+        charging = charging_of(data.dc_link)
+        self.control = ModeControl(settings, self.plc, self.standing_power, pe_ids, charging)
         self.modes = self.control.modes
         self.pauses = self.control.pauses
         self.tool = ToolPoint(cell.robot, cell.base_pose, cell.tcp)

@@ -106,7 +106,7 @@ class GearFigures:
 class LinkFigures:
     """DC link and its supply: capacitance [F], mains [V] rectified, chopper_on and chopper_off [V],
     resistor [ohm], rectifier_drop [V] and rectifier_resistance [ohm] in series with what the mains
-    give.
+    give; discharge_rate [1/s]: by which the voltage falls while the drive bus is off.
     """
 
     capacitance: float
@@ -116,6 +116,7 @@ class LinkFigures:
     resistor: float
     rectifier_drop: float
     rectifier_resistance: float
+    discharge_rate: float = 0.0
 
     def __post_init__(self) -> None:
         _checked(self)
@@ -197,5 +198,6 @@ def nominal_plant(robot: RobotModel, data: PowerData) -> Plant:
         link.brake_resistor,
         0.0,
         0.0,
+        link.discharge_rate,
     )
     return Plant(NOMINAL, robot, drives, gears, circuit, standing_watts(data))

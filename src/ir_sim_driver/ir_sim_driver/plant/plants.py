@@ -94,7 +94,7 @@ def typical_plant(robot: RobotModel, data: PowerData, seed: int) -> Plant:
     marks = robot.marks
     power = data.marks
     nominal = nominal_plant(robot, data)
-    return Plant(
+    plant = Plant(
         f"{TYPICAL}:{seed}",
         _robot(robot, marks, draw),
         _drives(nominal, robot, marks, draw),
@@ -102,6 +102,8 @@ def typical_plant(robot: RobotModel, data: PowerData, seed: int) -> Plant:
         _link(nominal, data, power, draw),
         _watts(nominal, power, robot.n, draw),
     )
+    rate = nominal.link.discharge_rate * draw.one(power.get("dc_link.discharge_s", UNMARKED))
+    return replace(plant, link=replace(plant.link, discharge_rate=rate))
 
 
 def _robot(robot: RobotModel, marks: Mapping[str, str], draw: _Draw) -> RobotModel:
@@ -242,6 +244,7 @@ _LINK: _Keys = {
     "brake_resistor_ohm": ("resistor", 0.1, 1e4, "ohm"),
     "rectifier_drop_v": ("rectifier_drop", 0.0, 100.0, "V"),
     "rectifier_resistance_ohm": ("rectifier_resistance", 0.0, 100.0, "ohm"),
+    "discharge_per_s": ("discharge_rate", 0.0, 10.0, "1/s"),
 }
 _LINK_KEYS = ("name", "mass_kg", "com_m", "inertia_kgm2")
 _WATTS = ("controller_w", "drives_w", "tool_factor")

@@ -6,6 +6,8 @@ import math
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -69,13 +71,21 @@ class BasePower:
 # step goes from event to event: the rectifier begins to conduct where U falls to the mains'
 # voltage, the chopper closes at its upper and opens at its lower voltage. Nothing is lost: what
 # the mains gave is what the drives, the resistor and the capacitor took.
+#
+# Where the drive bus is off the mains are cut from the link, and bleed resistors empty the
+# capacitor, U falling with e^(-t/T). When it is on again a constant current charges the capacitor
+# to the mains' voltage; what the mains give beyond the capacitor's energy is lost in the precharge
+# resistor: of all charge q U_mains, half of it where the capacitor was empty.
 
 _EVENTS = 1000  # in one step: far more than any chopper switches
+PRECHARGE = 0.5
+"""s in which an empty capacitor is charged: an estimate, which only the peak depends on."""
 
 
 class Flows(NamedTuple):
     """Energies [J] of a step: through the rectifier into the link (negative: fed back), into the
-    brake resistor, and lost in the rectifier, which the mains give on top.
+    brake resistor, and lost in the rectifier and the precharge resistor, which the mains give on
+    top.
     """
 
     supplied: float
@@ -84,7 +94,9 @@ class Flows(NamedTuple):
 
 
 class DcCircuit:
-    """Steps of dt [s]; stored [J]: in the capacitor, above what the mains charge it to."""
+    """Steps of dt [s]; stored [J]: in the capacitor, above what the mains charge it to; negative
+    after the drive bus was off, until it is charged again.
+    """
 
     def __init__(
         self, figures: LinkFigures, dt: float, regeneration: Regeneration = "shared"
@@ -103,10 +115,20 @@ class DcCircuit:
     @property
     def voltage(self) -> float:
         """U [V] of the capacitor."""
-        return math.sqrt(2.0 * (self._rest + self.stored) / self._figures.capacitance)
+        return math.sqrt(2.0 * max(self._rest + self.stored, 0.0) / self._figures.capacitance)
+
+    def off(self, steps: int) -> float:
+        """Let steps pass with the drive bus off; the energy [J] that the bleed resistors take."""
+        exponent = -2.0 * self._figures.discharge_rate * steps * self._dt
+        lost = (self._rest + self.stored) * -math.expm1(exponent)
+        self.stored -= lost
+        self._closed = False
+        return lost
 
     def step(self, powers: Sequence[float]) -> Flows:
         """Let the axes take constant powers [W] for dt."""
+        if self.stored < 0.0:
+            return self._charging(sum(powers))
         if self._regeneration == "none":  # every axis has a resistor of its own, nothing is shared
             braked = sum(-p for p in powers if p < 0.0) * self._dt
             supplied = self._ideal(sum(powers) * self._dt + braked)[0]
@@ -153,6 +175,23 @@ class DcCircuit:
         lost = f.rectifier_drop * taken + f.rectifier_resistance / f.mains * taken * taken
         drawn: FloatArray = taken + lost / f.mains
         return drawn
+
+    def _charging(self, power: float) -> Flows:
+        """A step while the capacitor is charged to the mains' voltage; the axes are fed beside it,
+        and what they give goes into it.
+        """
+        f = self._figures
+        given = max(-power, 0.0) * self._dt
+        volts = self.voltage
+        after = min(volts + f.mains * self._dt / PRECHARGE, f.mains)
+        gained = -self.stored
+        if after < f.mains:
+            gained = 0.5 * f.capacitance * (after - volts) * (after + volts)
+        lost = f.capacitance * (after - volts) * f.mains - gained
+        self.stored = 0.0 if after >= f.mains else self.stored + gained
+        self.stored += given
+        supplied = max(power, 0.0) * self._dt + gained
+        return Flows(supplied, 0.0, self._loss(supplied + lost) + lost)
 
     def _events(self, power: float) -> tuple[float, float]:
         """Energies supplied and dissipated in a step of this power."""
@@ -234,9 +273,9 @@ class DcCircuit:
 
 # Meter: energy is the integral of the power.
 #
-# mains = base + supplied + rectifier loss, and supplied = axes + brake resistor + change of the
-# capacitor; what an axis takes is mechanical work, copper, inverter and iron losses. All of it is
-# the plant's own.
+# mains = base + supplied + rectifier loss, and supplied = axes + brake resistor + bleed resistors +
+# change of the capacitor; what an axis takes is mechanical work, copper, inverter and iron losses.
+# All of it is the plant's own.
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,8 +283,9 @@ class MeterReading:
     """Since the meter started, and in the last step.
 
     time [s], energy [J] at the mains: of base_energy (tool_energy is a part of it), axis_energy
-    (n,), burnt_energy, capacitor_energy and rectifier_energy. axis_energy is made of
-    mechanical_energy, copper_energy, inverter_energy and iron_energy, each (n,). base_power,
+    (n,), burnt_energy, bled_energy (in the bleed resistors), capacitor_energy and rectifier_energy
+    (the precharge resistor's is a part of it). axis_energy is made of mechanical_energy,
+    copper_energy, inverter_energy and iron_energy, each (n,). base_power,
     tool_power [W], bus_voltage [V], joint_power (n,) [W], joint_torque (n,) [Nm], joint_current
     (n,) [A rms] of the last step.
     """
@@ -253,6 +293,7 @@ class MeterReading:
     time: float
     energy: float
     burnt_energy: float
+    bled_energy: float
     base_energy: float
     tool_energy: float
     rectifier_energy: float
@@ -277,11 +318,12 @@ class PowerMeter:
         self._dt = dt
         self._losses = DriveLosses(plant.drives, np.array(plant.robot.gear_ratio))
         self._circuit = DcCircuit(plant.link, dt, regeneration)
-        self._loads: list[tuple[int, float, float, bool, bool]] = []  # steps that have the same
+        self._loads: list[tuple[int, float, float, bool, bool, bool]] = []  # of as many steps
         self._pending = 0
         self._steps = 0
         self._supplied = 0.0
         self._dissipated = 0.0
+        self._bled = 0.0
         self._rectifier = 0.0
         self._base_energy = 0.0
         self._tool_energy = 0.0
@@ -301,11 +343,13 @@ class PowerMeter:
         steps: int = 1,
         *,
         whole: bool = False,
+        drive_bus: bool = True,
     ) -> None:
         """Count steps with this base load [W], the tool's share of it, and whether motors are
-        on; whole: it holds what the axes take at rest, the base load is what remains.
+        on; whole: it holds what the axes take at rest, the base load is what remains. drive_bus:
+        whether the mains feed the DC link.
         """
-        self._loads.append((steps, base_power, tool_power, powered, whole))
+        self._loads.append((steps, base_power, tool_power, powered, whole, drive_bus))
         self._pending += steps
 
     def settle(self, work: Work) -> None:
@@ -315,13 +359,20 @@ class PowerMeter:
         if not self._pending:
             return
         dt = self._dt
-        counts, base, tool, powered, whole = zip(*self._loads, strict=True)
+        counts, base, tool, powered, whole, drive_bus = zip(*self._loads, strict=True)
         axes = self._losses.power(work, np.repeat(np.array(powered, dtype=np.float64), counts))
         total = axes.total
-        flows = self._circuit.steps(total)
-        self._supplied += flows.supplied
-        self._dissipated += flows.dissipated
-        self._rectifier += flows.rectifier
+        begin = 0
+        for on, loads in groupby(zip(drive_bus, counts, strict=True), key=itemgetter(0)):
+            steps = sum(count for _, count in loads)
+            if on:
+                flows = self._circuit.steps(total[begin : begin + steps])
+                self._supplied += flows.supplied
+                self._dissipated += flows.dissipated
+                self._rectifier += flows.rectifier
+            else:  # brakes are closed: the axes take nothing
+                self._bled += self._circuit.off(steps)
+            begin += steps
         self._steps += len(total)
         self._base_energy += dt * float(np.dot(counts, base))
         self._tool_energy += dt * float(np.dot(counts, tool))
@@ -346,6 +397,7 @@ class PowerMeter:
             time=self._steps * self._dt,
             energy=self._base_energy + self._supplied + self._rectifier,
             burnt_energy=self._dissipated,
+            bled_energy=self._bled,
             base_energy=self._base_energy,
             tool_energy=self._tool_energy,
             rectifier_energy=self._rectifier,
