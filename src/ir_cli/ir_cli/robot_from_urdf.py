@@ -94,12 +94,15 @@ def _made(source: RobotSource) -> MadeRobot:
     arm, masses = with_masses(arm, bodies, source.mass)
     sheet = _sheet(source, arm)
     names = link_names(arm, sheet)
-    shapes = capsules_of(arm, bodies, names, sheet.radii)
     low, high = (np.radians(sheet.values[f"position_{end}_deg"].numbers) for end in ("min", "max"))
     _check_leaders(arm, low, high)
     given = sheet.values.get("machine_home_deg")
     home = None if given is None else np.asarray(np.radians(given.numbers), dtype=np.float64)
+    shapes = capsules_of(arm, bodies, names, sheet.radii)
     pairs = pairs_of(arm, shapes.capsules, bodies, low, high, home)
+    if pairs.unclear:
+        shapes = capsules_of(arm, bodies, names, sheet.radii, pairs.unclear)
+        pairs = pairs_of(arm, shapes.capsules, bodies, low, high, home)
     notes = [*arm.notes, *meshes.notes, *masses, *sheet.notes]
     if given is None:
         sheet = with_home(sheet, _home(arm, sheet, shapes, pairs, (low, high)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from ir_kernels import Chain
 from ir_values.arrays import FloatArray
 
 WRITTEN = 1e-9  # m: by which the digits of a file may move a capsule
+_FINER = (10, 0.01)  # capsules of a link at most, and what one must save, where that helps
 _LONG = 5e-3  # m: a link without a body that is shorter needs no capsule
 
 
@@ -28,9 +29,11 @@ def capsules_of(
     bodies: Sequence[Sequence[LinkBody]],
     names: Sequence[str],
     radii: FloatArray | None,
+    finer: Set[int] = frozenset(),
 ) -> Shapes:
-    """Fitted to the bodies of each link; without any, from its joint to the next with the sheet's
-    radius (7,), or with that of the link before.
+    """Fitted to the bodies of each link, with more and tighter ones for the links in `finer`;
+    without any, from its joint to the next with the sheet's radius (7,), or with that of the link
+    before.
     """
     capsules: list[Capsule] = []
     sentences: list[str] = []
@@ -38,7 +41,7 @@ def capsules_of(
         to = arm.origin[k] if k < len(arm.origin) else np.zeros(3)
         wider = arm.rounding + max((body.beside for body in own), default=0.0) + WRITTEN
         if own:
-            fits, said = _fits(own, to, wider)
+            fits, said = _fits(own, to, wider, k in finer)
         else:
             fits, said = _without_body(to, k, capsules, radii)
             if not fits:
@@ -52,7 +55,7 @@ def capsules_of(
 
 
 def _fits(
-    bodies: Sequence[LinkBody], to: FloatArray, wider: float
+    bodies: Sequence[LinkBody], to: FloatArray, wider: float, fine: bool
 ) -> tuple[list[CapsuleFit], list[str]]:
     """Capsules of a link's bodies, with words on each; to (3,): the next joint; wider [m]: by what
     their radii will be larger.
@@ -62,7 +65,8 @@ def _fits(
     around = [body for body in bodies if body.exact is None]
     if around:
         slack = max(body.slack for body in around) + wider
-        fits += fitted(np.concatenate([body.triangles for body in around]), to)
+        triangles = np.concatenate([body.triangles for body in around])
+        fits += fitted(triangles, to, *(_FINER if fine else ()))
         stands = [f"stands out {_millimetres(fit.overhang + slack)} mm at most" for fit in fits]
         holds = f"{around[0].place}" if len(around) == 1 else f"{len(around)} bodies"
         said += [f"{words} from what it encloses: {holds}" for words in stands]

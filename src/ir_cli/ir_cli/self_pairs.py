@@ -3,7 +3,8 @@
 Neighbours are left out: their bodies meet at the joint. Others that are near in many postures are
 near by construction: they keep a distance of their own, so that capsules that are wider than the
 bodies leave the robot its work. It is never below what the capsules were seen to be apart in a
-posture in which the bodies meet.
+posture in which what they stand for meets: each piece of a link's surface stands for one capsule,
+the narrowest that holds it.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ir_description import Capsule
-from ir_description.files.convex_pieces import halved
+from ir_description.files.convex_pieces import fine_triangles, halved
 from ir_description.files.making import LinkBody, UrdfArm, beside_axis
 from ir_description.robot import ReducedDistance
 from ir_kernels import Chain, CollisionModel
@@ -31,14 +32,16 @@ construction.
 ROOM = 0.002
 """m below the distance that a tenth of the postures do not reach."""
 _DEEPEST = 0.1  # of the postures of a pair that is built so, which are not allowed
-_BUILT_SO = 0.5  # of the postures in which points that meet do so by construction
+_BUILT_SO = 0.5  # of the postures in which rings that meet do so by construction
+_RING = 0.01  # m: width and height of a ring
+_BESIDE = 0.02  # m from a ring that is built so: taken for built so, too
 _LEFT = 0.3  # of the postures that a pair must leave
 LEAST_LEFT = 0.1
 """Share of postures that two links must leave to be told apart by their capsules."""
-_WIDEST = 0.4  # of the postures, of links that can't be told apart
-_WIDE = "that leaves no posture: lowered to what the widest 40 % keep"
-_AT_HOME = "lowered to what the given home posture keeps"
-_VOXELS = 60  # along a part: one point stands for the surface in each
+_VOXELS = 60  # along a capsule: one point stands for the surface in each
+_ALONG = 20  # points along a body that is a capsule
+_TOUCH = 1e-9  # m: of rounding, by which a corner may be out of its capsule
+_HALVINGS = 16
 _LOOKED_AT = 48  # postures, for what is built so and in a round around those that meet
 _TRIED = 500  # postures in which capsules overlap, but by no more than usual
 _DEEPER = 60  # in which they overlap by more
@@ -48,10 +51,13 @@ _STEPS = (0.06, 0.03, 0.015, 0.008)  # of the range of each joint
 
 
 class Pairs(NamedTuple):
-    """Pairs of capsules that can touch; those of them that keep a distance of their own."""
+    """Pairs of capsules that can touch; those of them that keep a distance of their own; unclear:
+    links whose capsules leave hardly a posture, or forbid the given home.
+    """
 
     pairs: tuple[tuple[str, str], ...]
     reduced: tuple[ReducedDistance, ...]
+    unclear: frozenset[int] = frozenset()
 
 
 def pairs_of(
@@ -62,9 +68,7 @@ def pairs_of(
     high: FloatArray,
     home: FloatArray | None,
 ) -> Pairs:
-    """All pairs of capsules of links that are no neighbours; home: a given one [rad], at which the
-    robot stands whatever its capsules say.
-    """
+    """All pairs of capsules of links that are no neighbours; home: a given one [rad]."""
     far = [
         (a.name, b.name)
         for k, a in enumerate(capsules)
@@ -76,32 +80,29 @@ def pairs_of(
     q = np.random.default_rng(0).uniform(low, high, (POSTURES, len(low)))
     distance = model.distances(q)
     named = {capsule.name: capsule for capsule in capsules}
-    surfaces = _Surfaces(arm, bodies)
+    surfaces = _Surfaces(arm, capsules, bodies)
     groups: dict[tuple[int, int], list[int]] = {}
     for z, (_, first, second) in enumerate(model.pairs):
         if float((distance[:, z] <= SAFETY).mean()) > NEAR:
             links = sorted((named[first].link, named[second].link))
             groups.setdefault((links[0], links[1]), []).append(z)
-    least_at_home = np.full(distance.shape[1], np.inf)
-    if home is not None:
-        least_at_home = model.distances(home[None])[0] - ROOM
     reduced = []
-    for near in groups.values():
+    unclear: set[int] = set()
+    for links, near in groups.items():
         own = []
         for z in near:
             pair = (named[name] for name in model.pairs[z][1:])
             one, other = sorted(pair, key=lambda each: each.link)
             own.append(_own_distance(distance[:, z], _Meeting(chain, one, other, surfaces, q)))
-        room = (distance[:, near] - [kept for kept, _ in own]).min(axis=1)
-        lower = min(0.0, float(np.quantile(room, 1.0 - _WIDEST)))
-        if float((room > 0.0).mean()) < LEAST_LEFT:
-            own = [(kept + lower, f"{reason}; {_WIDE}") for kept, reason in own]
-        for z, (kept, reason) in zip(near, own, strict=True):
-            if least_at_home[z] < kept:
-                kept = float(least_at_home[z])
-                reason = f"{reason}; {_AT_HOME}"
-            reduced.append(ReducedDistance(*model.pairs[z][1:], kept, reason))
-    return Pairs(tuple(far), tuple(reduced))
+        kept = np.array([each for each, _ in own])
+        left = float((distance[:, near] > kept).all(axis=1).mean())
+        free_at_home = home is None or (model.distances(home[None])[0, near] > kept).all()
+        if left < LEAST_LEFT or not free_at_home:
+            unclear.update(links)
+        for z, (each, reason) in zip(near, own, strict=True):
+            said = f"{reason}; leaves {100.0 * left:.1f} %" if left < LEAST_LEFT else reason
+            reduced.append(ReducedDistance(*model.pairs[z][1:], each, said))
+    return Pairs(tuple(far), tuple(reduced), frozenset(unclear))
 
 
 def _own_distance(distance: FloatArray, meeting: _Meeting) -> tuple[float, str]:
@@ -150,58 +151,91 @@ class _Points(NamedTuple):
 
 
 class _Surfaces:
-    """Surfaces of the links by their capsules."""
+    """Surfaces of the links, shared out among their capsules."""
 
-    def __init__(self, arm: UrdfArm, bodies: Sequence[Sequence[LinkBody]]) -> None:
+    def __init__(
+        self, arm: UrdfArm, capsules: Sequence[Capsule], bodies: Sequence[Sequence[LinkBody]]
+    ) -> None:
         self._rounding = arm.rounding
+        self._capsules = capsules
         self._bodies = bodies
-        self._known: dict[str, _Points] = {}
+        self._known: dict[str, tuple[_Points, cKDTree]] = {}
 
-    def within(self, capsule: Capsule) -> _Points:
-        """Points of its link's surface in a capsule; of a link without a body, none."""
+    def of(self, capsule: Capsule) -> tuple[_Points, cKDTree]:
+        """Points of what a capsule stands for, and a tree of them; of a link without a body,
+        none.
+        """
         if capsule.name not in self._known:
-            self._known[capsule.name] = self._sampled(capsule)
+            own = [each for each in self._capsules if each.link == capsule.link]
+            for each, points in zip(own, self._sampled(own), strict=True):
+                self._known[each.name] = points, cKDTree(points.at)
         return self._known[capsule.name]
 
-    def _sampled(self, capsule: Capsule) -> _Points:
-        points = [np.zeros((0, 3))]
-        radii = [np.zeros(0)]
-        size = float(np.linalg.norm(capsule.p1 - capsule.p0)) + 2.0 * capsule.radius
-        for body in self._bodies[capsule.link]:
+    def _sampled(self, capsules: Sequence[Capsule]) -> list[_Points]:
+        """Points of the surface of a link whose capsules are given, for each of them."""
+        found = [[_Points(np.zeros((0, 3)), np.zeros(0))] for _ in capsules]
+        for body in self._bodies[capsules[0].link]:
             wider = body.beside + self._rounding
             if body.exact is not None:
                 p0, p1, ball, _ = body.exact
-                points.append(np.linspace(p0, p1, 20))
-                half = 0.5 / 19.0 * float(np.linalg.norm(p1 - p0))
-                radii.append(np.full(20, ball + half + wider))
-            else:
-                near = _in_capsule(body.triangles, capsule, size / _VOXELS)
-                at, around = _voxels(near, size)
-                points.append(at)
-                radii.append(around + wider)
-        return _Points(np.concatenate(points), np.concatenate(radii))
+                half = 0.5 / (_ALONG - 1) * float(np.linalg.norm(p1 - p0))
+                points = _Points(np.linspace(p0, p1, _ALONG), np.full(_ALONG, ball + half + wider))
+                found[_holder(points.at, ball, capsules)].append(points)
+                continue
+            for k, share in enumerate(_shared_out(body.triangles, capsules)):
+                size = float(np.linalg.norm(capsules[k].p1 - capsules[k].p0))
+                at, around = _voxels(share, size + 2.0 * capsules[k].radius)
+                found[k].append(_Points(at, around + wider))
+        return [
+            _Points(
+                np.concatenate([each.at for each in own]),
+                np.concatenate([each.radius for each in own]),
+            )
+            for own in found
+        ]
 
 
-def _in_capsule(triangles: FloatArray, capsule: Capsule, fine: float) -> FloatArray:
-    """Triangles with edges of at most 2 fine [m] that together hold what of the surface is in a
-    capsule.
+def _outside(points: FloatArray, capsules: Sequence[Capsule]) -> FloatArray:
+    """How far points (.., 3) are out of each of K capsules (K, ..) [m], below 0 in it."""
+    return np.array([beside_axis(points, each.p0, each.p1) - each.radius for each in capsules])
+
+
+def _holder(points: FloatArray, ball: float, capsules: Sequence[Capsule]) -> int:
+    """The narrowest of the capsules that holds balls around points (N, 3), else the one that holds
+    most of them.
     """
-    while True:
-        centres = triangles.mean(axis=1)
-        radius = np.linalg.norm(triangles - centres[:, None], axis=2).max(axis=1)
-        beside = beside_axis(centres, capsule.p0, capsule.p1)
-        triangles = triangles[beside <= capsule.radius + radius]
-        edges = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
-        long = edges.max(axis=1, initial=0.0) > 2.0 * fine
-        if not long.any():
-            return triangles
-        triangles = np.concatenate([triangles[~long], halved(triangles[long])])
+    out = _outside(points, capsules).max(axis=1) + ball
+    radius = np.array([each.radius for each in capsules])
+    return int(np.argmin(np.where(out <= _TOUCH, radius, radius.max() + out)))
+
+
+def _shared_out(triangles: FloatArray, capsules: Sequence[Capsule]) -> list[FloatArray]:
+    """Triangles (T, 3, 3) by the narrowest of the capsules that holds each; those that none holds
+    are cut.
+    """
+    order = np.argsort([each.radius for each in capsules], kind="stable")
+    found: list[list[FloatArray]] = [[np.zeros((0, 3, 3))] for _ in capsules]
+    for last in [*[False] * _HALVINGS, True]:
+        for k in order:
+            out = _outside(triangles, capsules[k : k + 1])[0].max(axis=1)
+            inside = out <= _TOUCH
+            found[k].append(triangles[inside])
+            triangles = triangles[~inside]
+        if not len(triangles):
+            break
+        if last:  # of rounding, or of shapes without a capsule
+            nearest = _outside(triangles.mean(axis=1), capsules).argmin(axis=0)
+            for k in range(len(capsules)):
+                found[k].append(triangles[nearest == k])
+        triangles = halved(triangles)
+    return [np.concatenate(each) for each in found]
 
 
 def _voxels(triangles: FloatArray, size: float) -> tuple[FloatArray, FloatArray]:
     """One point (N, 3) for the triangles in each voxel, and the radius (N,) that holds these."""
     if not len(triangles):
         return np.zeros((0, 3)), np.zeros(0)
+    triangles = fine_triangles(triangles, size / _VOXELS)
     centres = triangles.mean(axis=1)
     cells = np.floor(centres / (size / _VOXELS)).astype(np.int64)
     _, which = np.unique(cells, axis=0, return_inverse=True)
@@ -220,10 +254,12 @@ def _thinned(rows: IntArray, most: int) -> IntArray:
 
 
 class _Meeting:
-    """Postures in which the bodies in two capsules meet, of a link and of one beyond the next.
+    """Postures in which what two capsules stand for meets, of a link and of one beyond the next.
 
     built_so: what of it is left out because they are built so, as a shaft in its housing, in words;
-    "" for nothing. Of the rest of both surfaces counts what meets anything.
+    "" for nothing. Places are rings about the joint that leads from one link towards the other one:
+    what turns in something meets it all around. Of the other rings of both surfaces counts what
+    meets anything.
     """
 
     def __init__(
@@ -234,9 +270,16 @@ class _Meeting:
         self._model = CollisionModel(chain, (one, other), (), [(one.name, other.name)])
         self._q = q
         self._joints = np.arange(one.link, other.link)
-        self._sides = (surfaces.within(one), surfaces.within(other))
+        both = [surfaces.of(one), surfaces.of(other)]
+        self._sides = tuple(points for points, _ in both)
+        self._trees = tuple(tree for _, tree in both)
         self._counted = tuple(np.ones(len(each.at), dtype=bool) for each in self._sides)
-        self._trees: tuple[cKDTree, ...] = ()
+        rings = [
+            _rings(points.at, *axis)
+            for points, axis in zip(self._sides, self._axes(one.link, other.link), strict=True)
+        ]
+        self._rings = tuple(each for each, _ in rings)
+        self._ring_of = tuple(each for _, each in rings)
         self.built_so = ""
 
     def largest_distance(self, usual: float) -> float:
@@ -246,15 +289,20 @@ class _Meeting:
         """
         if not all(len(each.at) for each in self._sides):
             return 0.0
-        self._trees = tuple(cKDTree(each.at) for each in self._sides)
         few = self._q[:_LOOKED_AT]
         distance = self._distances(self._q)
         found = self._found(distance, usual)
         if float((distance > found).mean()) >= _LEFT:
             return found
-        counts = self._meetings(few)
-        self._counted = tuple(each < _BUILT_SO * len(few) for each in counts)
-        self.built_so = "places that do so in half of all postures are taken for built so"
+        times = self._times_that_rings_meet(few)
+        self._counted = tuple(
+            _away(rings, each >= _BUILT_SO * len(few))[self._ring_of[side]]
+            for side, (rings, each) in enumerate(zip(self._rings, times, strict=True))
+        )
+        self.built_so = (
+            "rings about a joint that do so in half of all, and what is within "
+            f"{1e3 * _BESIDE:g} mm, are taken for built so"
+        )
         return self._found(distance, usual)
 
     def _found(self, distance: FloatArray, usual: float) -> float:
@@ -263,11 +311,20 @@ class _Meeting:
         kept = order[(distance[order] <= 0.0) & (distance[order] > usual)]
         deeper = order[distance[order] <= usual]
         tried = np.concatenate([_thinned(kept, _TRIED), _thinned(deeper, _DEEPER)])
-        met = self._meet(self._q[tried])
-        if not met.any():
+        first = tried[self._first_that_meet(self._q[tried])]
+        if not len(first):
             return -np.inf
-        first = tried[met][:_FROM]
         return self._climbed(self._q[first], distance[first])
+
+    def _first_that_meet(self, q: FloatArray) -> IntArray:
+        """The first rows of q (N, n) in which the surfaces may meet, _FROM at most."""
+        found: list[int] = []
+        for begin in range(0, len(q), _LOOKED_AT):
+            met = self._meet(q[begin : begin + _LOOKED_AT])
+            found += (begin + np.flatnonzero(met)).tolist()
+            if len(found) >= _FROM:
+                break
+        return np.array(found[:_FROM], dtype=int)
 
     def _climbed(self, q: FloatArray, distance: FloatArray) -> float:
         """The largest distance of the capsules in postures near those q (N, n) that meet."""
@@ -323,10 +380,41 @@ class _Meeting:
         far, _ = self._trees[1 - side].query(points.at[inside], distance_upper_bound=limit)
         return np.asarray(chosen[inside][far <= own + most])
 
-    def _meetings(self, q: FloatArray) -> list[FloatArray]:
-        """In how many postures each point of both sides may meet the other one."""
-        counts = [np.zeros(len(each.at)) for each in self._sides]
+    def _times_that_rings_meet(self, q: FloatArray) -> list[IntArray]:
+        """In how many postures some point of each ring may meet the other side."""
+        counts = [np.zeros(len(rings), dtype=int) for rings in self._rings]
         for poses in self._relative(q):
-            for side in (0, 1):
-                counts[side][self._meeting(side, poses[side])] += 1.0
+            for side, ring in enumerate(self._ring_of):
+                counts[side][np.unique(ring[self._meeting(side, poses[side])])] += 1
         return counts
+
+    def _axes(self, first: int, second: int) -> list[tuple[FloatArray, FloatArray]]:
+        """A point and the direction of the joint after the first link, and of the one before the
+        second, in the frame of the link.
+        """
+        poses = self._chain.link_poses(np.zeros((1, self._q.shape[1])))[0]
+        found = []
+        for link, joint in ((first, first), (second, second - 1)):
+            own = poses[link]
+            axis = own[:3, :3].T @ poses[joint + 1, :3, :3] @ self._chain.joint_axis[joint]
+            found.append((own[:3, :3].T @ (poses[joint + 1, :3, 3] - own[:3, 3]), axis))
+        return found
+
+
+def _rings(points: FloatArray, foot: FloatArray, axis: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Rings (M, 2) about an axis, along and beside it [m], and which of them points (N, 3) lie
+    in.
+    """
+    along = (points - foot) @ axis
+    beside = np.linalg.norm(points - foot - along[:, None] * axis, axis=1)
+    cells = np.floor(np.stack([along, beside], axis=1) / _RING)
+    rings, of = np.unique(cells, axis=0, return_inverse=True)
+    return _RING * rings, np.asarray(of).ravel()
+
+
+def _away(rings: FloatArray, built_so: BoolArray) -> BoolArray:
+    """Which of the rings (M, 2) lie beside none that is built so (M,)."""
+    if not built_so.any():
+        return np.ones(len(rings), dtype=bool)
+    far, _ = cKDTree(rings[built_so]).query(rings)
+    return np.asarray(far > _BESIDE)

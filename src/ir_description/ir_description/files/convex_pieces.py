@@ -284,14 +284,14 @@ def _apart(first: FloatArray, second: FloatArray) -> float:
     """A bound [m] of the distance of any point of a surface (T, 3, 3) from another one."""
     points = second.reshape(-1, 3)
     step = _FINE * float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
-    own = _fine(first, step)
+    own = fine_triangles(first, step)
     centres = own.mean(axis=1)
     radius = np.linalg.norm(own - centres[:, None], axis=2).max(axis=1)
-    distance, _ = cKDTree(_fine(second, step).mean(axis=1)).query(centres)
+    distance, _ = cKDTree(fine_triangles(second, step).mean(axis=1)).query(centres)
     return float((distance + radius).max())
 
 
-def _fine(triangles: FloatArray, step: float) -> FloatArray:
+def fine_triangles(triangles: FloatArray, step: float) -> FloatArray:
     """The same surface in triangles (T, 3, 3) without an edge longer than step [m]."""
     long = _longest(triangles) > step
     while long.any():

@@ -4,23 +4,26 @@ far they stand out from what they enclose.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from ir_description.files.convex_pieces import halved, point_triangle
-from ir_values.arrays import BoolArray, FloatArray, IntArray
+from ir_values.arrays import BoolArray, FloatArray
 
 MOST = 3
 """Capsules of a link, at most: each is compared with all others and with all machines."""
 _CUTS = (0.2, 0.35, 0.5, 0.65, 0.8)  # of the length
 _PAIRS = 0.05  # of the volume: what one capsule more must save to be worth its pairs
-_GRID = 20  # points along each edge of the box in which volumes are compared
+_GRID = 22  # points along each edge of the box in which volumes are compared
 _FEW = 800  # triangles with which cuts are compared
 _ROUNDS = 60  # of the circle around projected points: within 2 % of the smallest
 _QUICK = 12  # the same while cuts are compared
+_TRIED = 2  # cuts whose capsules are found exactly
+_OUTWARDS = np.random.default_rng(0).normal(size=(100, 3))
+"""Directions in which a part is outermost, while cuts are compared."""
 _EDGE = 0.15  # of the size: longer triangles are cut before they are shared among capsules
 _TRIANGLES = 60_000
 _NEAREST = 6  # triangles of which one is taken for the nearest to a point
@@ -40,35 +43,41 @@ class CapsuleFit(NamedTuple):
 
 
 def fitted(
-    triangles: FloatArray, axis: FloatArray | None = None, most: int = MOST
+    triangles: FloatArray,
+    axis: FloatArray | None = None,
+    most: int = MOST,
+    saved: float = _PAIRS,
 ) -> tuple[CapsuleFit, ...]:
     """Capsules that enclose triangles (T, 3, 3) together: one more, up to `most`, where that makes
-    what they fill smaller by a twentieth.
+    what they fill smaller by a share of `saved`.
 
     axis (3,): a direction that is tried beside the principal ones, as from one joint to the next.
     """
     fine = _cut(triangles)
     few = fine[:: max(1, len(fine) // _FEW)]
-    measure = _Measure(few.reshape(-1, 3))
-    labels = np.zeros(len(few), dtype=int)
-    chosen = labels
-    rough = [_best(few.reshape(-1, 3), axis, _QUICK)]
-    least = measure.union(rough)
-    while len(rough) < most:
-        cuts = [(k, above) for k in range(len(rough)) for above in _cuts(few, labels == k)]
-        tried = [_cut_capsules(few, labels, rough, cut, axis) for cut in cuts]
+    rough = _Rough(few, axis)
+    nearest = cKDTree(few.mean(axis=1)).query(fine.mean(axis=1))[1]
+
+    def exact(parts: Sequence[_Part]) -> list[CapsuleFit]:
+        corners = [_corners(fine[part.own[nearest]].reshape(-1, 3)) for part in parts]
+        return [_best(each, each, axis, _ROUNDS) for each in corners]
+
+    parts = [rough.part(np.ones(len(few), dtype=bool))]
+    chosen = exact(parts)
+    least = rough.volume(chosen)
+    while len(parts) < most:
+        tried = sorted(rough.more(parts), key=_volume_of_parts)[:_TRIED]
         if not tried:
             break
-        sizes = [measure.union(fits) for fits in tried]
-        best = int(np.argmin(sizes))
-        labels = np.where(cuts[best][1], len(rough), labels)
-        rough = tried[best]
-        if sizes[best] * (1.0 + _PAIRS) ** (len(rough) - 1) < least:
-            least = sizes[best] * (1.0 + _PAIRS) ** (len(rough) - 1)
-            chosen = labels
-    owner = chosen[cKDTree(few.mean(axis=1)).query(fine.mean(axis=1))[1]]
-    parts = [fine[owner == k].reshape(-1, 3) for k in range(int(chosen.max()) + 1)]
-    return with_overhang([_best(part, axis, _ROUNDS) for part in parts], triangles)
+        every = [exact(each) for each in tried]
+        volumes = [rough.volume(each) for each in every]
+        best = int(np.argmin(volumes))
+        parts = tried[best]
+        size = volumes[best] * (1.0 + saved) ** (len(parts) - 1)
+        if size < least:
+            least = size
+            chosen = every[best]
+    return with_overhang(chosen, triangles)
 
 
 def with_overhang(fits: Sequence[CapsuleFit], triangles: FloatArray) -> tuple[CapsuleFit, ...]:
@@ -88,49 +97,66 @@ def encloses(outer: CapsuleFit, inner: CapsuleFit) -> bool:
     return bool((beside_axis(ends, outer.p0, outer.p1) + inner.radius <= outer.radius).all())
 
 
-def _cuts(triangles: FloatArray, own: BoolArray) -> list[BoolArray]:
-    """Cuts of the triangles (T, 3, 3) that are `own` (T,) in two: each as those above it (T,)."""
-    found = []
-    for direction in _principal(triangles[own].reshape(-1, 3)):
-        along = triangles.mean(axis=1) @ direction
-        low = float(along[own].min())
-        for share in _CUTS:
-            above = own & (along > low + share * float(np.ptp(along[own])))
-            if above.any() and (own & ~above).any():
-                found.append(above)
-    return found
+class _Part(NamedTuple):
+    """Triangles that are its own (T,), and the points of a grid that its capsule fills (G,)."""
+
+    own: BoolArray
+    filled: BoolArray
 
 
-def _cut_capsules(
-    triangles: FloatArray,
-    labels: IntArray,
-    fits: Sequence[CapsuleFit],
-    cut: tuple[int, BoolArray],
-    axis: FloatArray | None,
-) -> list[CapsuleFit]:
-    """Capsules of all parts after one of them is cut: what is above it comes last."""
-    k, above = cut
-    below = (labels == k) & ~above
-    parts = [_best(triangles[each].reshape(-1, 3), axis, _QUICK) for each in (below, above)]
-    return [*fits[:k], parts[0], *fits[k + 1 :], parts[1]]
+def _volume_of_parts(parts: Sequence[_Part]) -> float:
+    """Points of the grid in any of their capsules."""
+    return float(np.any([part.filled for part in parts], axis=0).sum())
 
 
-class _Measure:
-    """Volume of unions of capsules around points (N, 3), by a grid of their box twice as large."""
+class _Rough:
+    """Ways to share out triangles (T, 3, 3), each part with a capsule around its outermost corners;
+    volumes by a grid of a box twice as large as theirs.
+    """
 
-    def __init__(self, points: FloatArray) -> None:
+    def __init__(self, triangles: FloatArray, axis: FloatArray | None) -> None:
+        self._triangles = triangles
+        self._axis = axis
+        points = triangles.reshape(-1, 3)
         low = points.min(axis=0)
         high = points.max(axis=0)
         room = 0.5 * float(np.max(high - low))
         axes = [np.linspace(a - room, b + room, _GRID) for a, b in zip(low, high, strict=True)]
-        self._points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        self._grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        self._known: dict[int, tuple[_Part, list[tuple[_Part, _Part]]]] = {}
 
-    def union(self, fits: Sequence[CapsuleFit]) -> float:
+    def part(self, own: BoolArray) -> _Part:
+        """A part with the capsule around its outermost corners, in a few directions."""
+        points = self._triangles[own].reshape(-1, 3)
+        outermost = np.unique(np.argmax(points @ _OUTWARDS.T, axis=0))
+        fit = _best(points, points[outermost], self._axis, _QUICK)
+        return _Part(own, self._filled(fit))
+
+    def more(self, parts: Sequence[_Part]) -> list[list[_Part]]:
+        """All parts, one of them cut in two, in several ways."""
+        found = []
+        for k, part in enumerate(parts):
+            if id(part) not in self._known:
+                self._known[id(part)] = part, [*self._cuts(part.own)]
+            found += [[*parts[:k], *cut, *parts[k + 1 :]] for cut in self._known[id(part)][1]]
+        return found
+
+    def volume(self, fits: Sequence[CapsuleFit]) -> float:
         """Points of the grid in any of the capsules."""
-        inside = np.zeros(len(self._points), dtype=bool)
-        for fit in fits:
-            inside |= beside_axis(self._points, fit.p0, fit.p1) <= fit.radius
-        return float(inside.sum())
+        return float(np.any([self._filled(fit) for fit in fits], axis=0).sum())
+
+    def _filled(self, fit: CapsuleFit) -> BoolArray:
+        return np.asarray(beside_axis(self._grid, fit.p0, fit.p1) <= fit.radius)
+
+    def _cuts(self, own: BoolArray) -> Iterator[tuple[_Part, _Part]]:
+        for direction in _principal(self._triangles[own].reshape(-1, 3)):
+            along = self._triangles.mean(axis=1) @ direction
+            low = float(along[own].min())
+            for share in _CUTS:
+                above = own & (along > low + share * float(np.ptp(along[own])))
+                below = own & ~above
+                if above.any() and below.any():
+                    yield self.part(below), self.part(above)
 
 
 def _cut(triangles: FloatArray) -> FloatArray:
@@ -253,43 +279,53 @@ def beside_axis(points: FloatArray, p0: FloatArray, p1: FloatArray) -> FloatArra
 
 def _principal(points: FloatArray) -> FloatArray:
     """Principal directions (3, 3) as rows, the longest first."""
-    return np.asarray(np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2])
-
-
-def _best(points: FloatArray, axis: FloatArray | None, rounds: int) -> CapsuleFit:
-    points = _corners(points)
-    directions = [*_principal(points), *np.eye(3)]
-    if axis is not None and np.linalg.norm(axis) > 1e-9:
-        directions.append(axis / np.linalg.norm(axis))
-    return min((_along(points, direction, rounds) for direction in directions), key=_volume)
+    beside = points - points.mean(axis=0)
+    return np.asarray(np.linalg.eigh(beside.T @ beside)[1].T[::-1])
 
 
 def _corners(points: FloatArray) -> FloatArray:
-    points = np.unique(points, axis=0)
+    """Those of the hull of points (N, 3); of flat ones, all."""
     try:
         return np.asarray(points[ConvexHull(points).vertices])
     except (QhullError, ValueError):
-        return points
+        return np.unique(points, axis=0)
 
 
-def _along(points: FloatArray, direction: FloatArray, rounds: int) -> CapsuleFit:
-    """The capsule with this direction, but for its overhang: a line through the middle of the
-    projected points, caps pulled in.
+def _best(
+    points: FloatArray, outermost: FloatArray, axis: FloatArray | None, rounds: int
+) -> CapsuleFit:
+    """The smallest capsule in one of a few directions around points (N, 3), as `outermost` (M, 3)
+    of them tell, but for its overhang: a line through the middle of the projected points.
+    """
+    directions = np.concatenate([_principal(outermost), np.eye(3)])
+    if axis is not None and np.linalg.norm(axis) > 1e-9:
+        directions = np.concatenate([directions, axis[None] / np.linalg.norm(axis)])
+    flat = outermost - (directions @ outermost.T)[:, :, None] * directions[:, None]
+    centre = flat.mean(axis=1)
+    rows = np.arange(len(directions))
+    for k in range(1, rounds):  # Badoiu and Clarkson: towards the farthest point, ever shorter
+        far = flat[rows, np.argmax(((flat - centre[:, None]) ** 2).sum(axis=2), axis=1)]
+        centre = centre + (far - centre) / (k + 1)
+    lines = [*zip(centre, directions, strict=True)]
+    line = min(lines, key=lambda each: _volume(_along(outermost, *each)))
+    return _along(points, *line)
+
+
+def _along(points: FloatArray, centre: FloatArray, direction: FloatArray) -> CapsuleFit:
+    """The capsule around a line, caps pulled in; where it is shorter than these, a sphere around
+    the middle.
     """
     along = points @ direction
-    flat = points - along[:, None] * direction
-    centre = flat.mean(axis=0)
-    for k in range(1, rounds):  # Badoiu and Clarkson: towards the farthest point, ever shorter
-        far = flat[np.argmax(((flat - centre) ** 2).sum(axis=1))]
-        centre = centre + (far - centre) / (k + 1)
-    beside = ((flat - centre) ** 2).sum(axis=1)
-    radius = float(np.sqrt(beside.max()))
-    cap = np.sqrt(np.maximum(radius**2 - beside, 0.0))
+    beside = ((points - along[:, None] * direction - centre) ** 2).sum(axis=1)
+    square = float(beside.max())
+    cap = np.sqrt(square - beside)
     low = float((along + cap).min())
     high = float((along - cap).max())
-    if low > high:  # shorter than its caps: a sphere around the middle
+    if low > high:
         middle = centre + 0.5 * (low + high) * direction
-        return CapsuleFit(middle, middle, float(np.linalg.norm(points - middle, axis=1).max()), 0.0)
+        ball = float(np.linalg.norm(points - middle, axis=1).max())
+        return CapsuleFit(middle, middle, ball, 0.0)
+    radius = float(np.sqrt(square))
     return CapsuleFit(centre + low * direction, centre + high * direction, radius, 0.0)
 
 
