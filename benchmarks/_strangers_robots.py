@@ -7,6 +7,7 @@ from __future__ import annotations
 import itertools
 import re
 import struct
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,9 @@ from scipy.spatial.transform import Rotation
 from ir_cli.robot_from_urdf import RobotSource, made_robot
 from ir_description.files.solid_mesh import read_solid
 from ir_kernels import Chain
+
+sys.path.append(str(Path(__file__).parents[1] / "tools"))
+from judge_robots import judged
 
 POSTURES = 20
 NEAR = 1e-9  # m: kinematics
@@ -72,6 +76,49 @@ def text_of(arm: Arm, more: str = "", link_6: str = "") -> str:
             f'effort="900" velocity="3"/></joint>'
         )
     return "\n".join([*lines, more, "</robot>"])
+
+
+STOUT = (2.0, 2.6, 3.2)
+"""How much wider than usual the balls of stout arms are."""
+STOUT_POSTURES = 200
+_MESH = (
+    '<collision name="more"><origin xyz="{}" rpy="{}"/><geometry><mesh filename="{}" '
+    'scale="{}"/></geometry></collision>'
+)
+
+
+def stout_urdfs(rng: np.random.Generator, folder: Path) -> Iterator[tuple[str, Path]]:
+    """Name and file of arms whose links overlap by construction: wide balls, and beside each the
+    hull of drawn points as a mesh.
+    """
+    for wider in STOUT:
+        arm = drawn_arm(rng)
+        arm = Arm(arm.origins, arm.axes, wider * arm.radii)
+        name = f"stout {wider:g}"
+        more = []
+        for k, radius in enumerate(arm.radii.tolist()):
+            mesh = folder / f"{name}_{k}.stl".replace(" ", "_")
+            mesh.write_bytes(binary_stl(solid(rng)))
+            place = 0.5 * arm.origins[k] if k < 6 else np.zeros(3)
+            angles = rng.uniform(-3.0, 3.0, 3)
+            scale = radius / 400.0 * rng.uniform(0.4, 1.2, 3)
+            numbers = (" ".join(map(repr, each.tolist())) for each in (place, angles))
+            size = " ".join(map(repr, scale.tolist()))
+            more.append(_MESH.format(*numbers, f"file://{mesh}", size))
+        bodies = iter(more)
+        end = "</collision></link>"
+        text = re.sub(end, lambda _, b=bodies: f"</collision>{next(b)}</link>", text_of(arm))
+        path = folder / f"{name.replace(' ', '_')}.urdf"
+        path.write_text(text)
+        yield name, path
+
+
+def meet_though_allowed(path: Path) -> str:
+    """Where meshes meet in a posture that the robot's self check allows, though they are not built
+    so, "" for nowhere. Raises InputError.
+    """
+    good, line = judged(RobotSource(path, payload=5.0, mass=100.0), STOUT_POSTURES)
+    return "" if good else line
 
 
 SHAPE = '<collision name="more"><origin xyz="0.05 0.1 0"/><geometry>{}</geometry></collision>'

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import itertools
 import json
+import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,19 +21,23 @@ from ir_cli.self_pairs import SAFETY
 from ir_description.files.making import urdf_arm
 from ir_kernels import Chain, CollisionModel
 
+sys.path.append(str(Path(__file__).parents[2] / "tools"))
+
 pinocchio = pytest.importorskip("pinocchio")
 coal = pytest.importorskip("coal")
 
 KINEMATICS = 1e-9  # m and entries of a rotation
 POSTURES = 40
+FAT_POSTURES = 120
 TOUCH = 1e-6  # m: what the judge's distances are off by
 AXES = ("0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 1 0", "1 0 0")
 PLACES = ("0 0 0.4", "0.25 0.05 0.1", "0 0 0.7", "0.2 0 0.1", "0.5 0 0", "0.15 0 0")
 
 
-def urdf(seed: int, meshes: Path | None = None, digits: int = 17) -> str:
+def urdf(seed: int, meshes: Path | None = None, digits: int = 17, size: float = 1.0) -> str:
     """A six-axis arm with turned frames, two bodies of drawn kinds a link, and no masses; meshes: a
-    folder for some of them that are meshes; digits: of the angles.
+    folder for some of them that are meshes; digits: of the angles; size: of the bodies, against the
+    arm.
     """
     draw = np.random.default_rng(seed)
     names = ["base_link", *(f"link_{k}" for k in range(1, 7))]
@@ -42,10 +48,10 @@ def urdf(seed: int, meshes: Path | None = None, digits: int = 17) -> str:
         bodies = []
         for share in (0.15, 0.6):
             at = " ".join(f"{x:.17g}" for x in turn.T @ (share * to))
-            one = shape(draw)
+            one = shape(draw, size)
             turned = ""
             if meshes is not None:
-                one = mesh(draw, meshes / f"{name}_{share}.stl")
+                one = mesh(draw, meshes / f"{name}_{share}.stl", size)
                 turned = f'rpy="{" ".join(f"{x:.6f}" for x in draw.uniform(-3.0, 3.0, 3))}"'
             bodies.append(
                 f'<collision><origin xyz="{at}" {turned}/><geometry>{one}</geometry></collision>'
@@ -69,8 +75,8 @@ def urdf(seed: int, meshes: Path | None = None, digits: int = 17) -> str:
     return "\n".join([*lines, "</robot>"])
 
 
-def shape(draw: np.random.Generator) -> str:
-    a, b, c = (f"{x:.4f}" for x in draw.uniform(0.03, 0.08, 3))
+def shape(draw: np.random.Generator, size: float) -> str:
+    a, b, c = (f"{x:.4f}" for x in size * draw.uniform(0.03, 0.08, 3))
     return draw.choice(
         [
             f'<box size="{a} {b} {c}"/>',
@@ -80,7 +86,7 @@ def shape(draw: np.random.Generator) -> str:
     )
 
 
-def mesh(draw: np.random.Generator, path: Path) -> str:
+def mesh(draw: np.random.Generator, path: Path, size: float) -> str:
     """A mesh that is not convex, thin, or far from its origin, at a scale that may mirror it."""
     a, b, c = draw.uniform(0.03, 0.09, 3)
     thin = draw.uniform(0.001, 0.01)
@@ -95,7 +101,7 @@ def mesh(draw: np.random.Generator, path: Path) -> str:
     corners = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
     sides = ConvexHull(corners).simplices
     scale = draw.uniform(0.5, 1.5, 3) * [1.0, draw.choice([-1.0, 1.0]), 1.0]
-    facets = [(corners * size + at)[side] / scale for size, at in boxes for side in sides]
+    facets = [size * (corners * box + at)[side] / scale for box, at in boxes for side in sides]
     path.write_text(
         "solid s\n"
         + "".join(
@@ -202,6 +208,26 @@ def test_a_home_leaves_room_to_every_pair_also_to_those_near_by_construction(
     kept = [min(SAFETY, own.get(frozenset((a, b)), SAFETY)) for _, a, b in model.pairs]
     room = model.distances(robot.machine_home[None])[0] - np.array(kept)
     assert room.min() > 0.9 * min(min(each) for each in ROOMS)
+
+
+@pytest.mark.parametrize("seed", [1, 3, *(pytest.param(k, marks=pytest.mark.long) for k in (2, 4))])
+def test_meshes_meet_in_no_allowed_posture_but_where_they_are_built_so(
+    seed: int, tmp_path: Path
+) -> None:
+    """Fat bodies that overlap by construction; and the judge objects where less is kept."""
+    from judge_robots import Judge, verdict
+
+    path = tmp_path / "drawn.urdf"
+    path.write_text(urdf(seed, tmp_path, size=3.5))
+    source = RobotSource(path, payload=5.0, mass=60.0)
+    made = made_robot(source)
+    assert made.robot.reduced_distances
+    judge = Judge(source, made)
+    good, line = verdict(judge, made.robot, FAT_POSTURES)
+    assert good, line
+    unkept = tuple(each._replace(distance=-1.0) for each in made.robot.reduced_distances)
+    good, line = verdict(judge, replace(made.robot, reduced_distances=unkept), FAT_POSTURES)
+    assert not good, line
 
 
 def coal_distance(shapes: object, placed: object, a: object, b: object) -> float:

@@ -110,7 +110,12 @@ class Postures:
         if len(far) and far.min() < 1.0:
             pair = self._model.pairs[int(np.argmin(far))]
             worst = f"; nearest most often: {pair.body_a} and {pair.body_b}"
-        return (
-            f"no machine home was found: of {_TRIED} postures are {shares}{worst}; give "
+        remedy = (
             "machine_home_deg or gear_peak_torque_nm in a drive sheet (ir robot new --template)"
         )
+        if not counts["free of itself"].any():
+            remedy = (
+                "collision shapes that are nearer to the real links, whose capsules overlap or "
+                "whose bodies meet wherever the joints turn, or leave one out (--without LINK)"
+            )
+        return f"no machine home was found: of {_TRIED} postures are {shares}{worst}; give {remedy}"
