@@ -19,6 +19,7 @@ from ir_cli.main import main
 from ir_cli.robot_from_urdf import RobotSource, made_robot
 from ir_cli.self_pairs import SAFETY
 from ir_description.files.making import urdf_arm
+from ir_description.robot import ReducedDistance
 from ir_kernels import Chain, CollisionModel
 
 sys.path.append(str(Path(__file__).parents[2] / "tools"))
@@ -225,7 +226,7 @@ def test_meshes_meet_in_no_allowed_posture_but_where_they_are_built_so(
     judge = Judge(source, made)
     good, line = verdict(judge, made.robot, FAT_POSTURES)
     assert good, line
-    unkept = tuple(each._replace(distance=-1.0) for each in made.robot.reduced_distances)
+    unkept = tuple(ReducedDistance(*pair, -1.0, "") for pair in made.robot.self_pairs)
     good, line = verdict(judge, replace(made.robot, reduced_distances=unkept), FAT_POSTURES)
     assert not good, line
 

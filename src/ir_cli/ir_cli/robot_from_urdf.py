@@ -101,7 +101,7 @@ def _made(source: RobotSource) -> MadeRobot:
     shapes = capsules_of(arm, bodies, names, sheet.radii)
     pairs = pairs_of(arm, shapes.capsules, bodies, low, high, home)
     if pairs.unclear:
-        shapes = capsules_of(arm, bodies, names, sheet.radii, pairs.unclear)
+        shapes = capsules_of(arm, bodies, names, sheet.radii, shapes, pairs.unclear)
         pairs = pairs_of(arm, shapes.capsules, bodies, low, high, home)
     notes = [*arm.notes, *meshes.notes, *masses, *sheet.notes]
     if given is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence, Set
 from typing import NamedTuple
 
@@ -23,21 +24,31 @@ class Shapes(NamedTuple):
     capsules: tuple[Capsule, ...]
     sentences: tuple[str, ...]
 
+    def of(self, link: str) -> list[str]:
+        """The sentences on the capsules of a link."""
+        begin = re.compile(rf"{re.escape(link)}(_\d+)?: ")
+        return [each for each in self.sentences if begin.match(each)]
+
 
 def capsules_of(
     arm: UrdfArm,
     bodies: Sequence[Sequence[LinkBody]],
     names: Sequence[str],
     radii: FloatArray | None,
+    before: Shapes | None = None,
     finer: Set[int] = frozenset(),
 ) -> Shapes:
-    """Fitted to the bodies of each link, with more and tighter ones for the links in `finer`;
-    without any, from its joint to the next with the sheet's radius (7,), or with that of the link
-    before.
+    """Fitted to the bodies of each link; without any, from its joint to the next with the sheet's
+    radius (7,), or with that of the link before. before: those of all links, of which only the
+    links in `finer` get more and tighter ones.
     """
     capsules: list[Capsule] = []
     sentences: list[str] = []
     for k, own in enumerate(bodies):
+        if before is not None and k not in finer:
+            capsules += [each for each in before.capsules if each.link == k]
+            sentences += before.of(names[k])
+            continue
         to = arm.origin[k] if k < len(arm.origin) else np.zeros(3)
         wider = arm.rounding + max((body.beside for body in own), default=0.0) + WRITTEN
         if own:

@@ -58,9 +58,14 @@ def fitted(
     rough = _Rough(few, axis)
     nearest = cKDTree(few.mean(axis=1)).query(fine.mean(axis=1))[1]
 
+    known: dict[int, tuple[_Part, CapsuleFit]] = {}
+
     def exact(parts: Sequence[_Part]) -> list[CapsuleFit]:
-        corners = [_corners(fine[part.own[nearest]].reshape(-1, 3)) for part in parts]
-        return [_best(each, each, axis, _ROUNDS) for each in corners]
+        for part in parts:
+            if id(part) not in known:
+                corners = _corners(fine[part.own[nearest]].reshape(-1, 3))
+                known[id(part)] = part, _best(corners, corners, axis, _ROUNDS)
+        return [known[id(part)][1] for part in parts]
 
     parts = [rough.part(np.ones(len(few), dtype=bool))]
     chosen = exact(parts)
