@@ -404,6 +404,26 @@ def test_the_soft_plc_answers_for_a_machine(ros_context, ros_executor, wait_for)
     cell.close()
 
 
+def test_a_signal_of_another_robot_holds_when_the_own_plant_has_come_to_its_time(
+    ros_context, ros_executor, wait_for
+):
+    cell = Cell(ros_context, ros_executor, peers=["/right/ir_program_runner"])
+    topic = "/right/ir_program_runner/machine_signals"
+    other = cell.test.create_publisher(SignalMsg, topic, 10)
+    wait_for(lambda: other.get_subscription_count() == 1)
+    cell.driver.tick = 0.0  # a plant that stands still, behind the one of the other robot
+    with cell.running([move(wait_for=("zone_1",))], wait_for):
+        wait_for(lambda: cell.runner._progress and cell.runner._progress.phase)
+        later = int(cell.driver.time) + 1
+        other.publish(SignalMsg(name="zone_1", value=True, stamp=Time(sec=later)))
+        wait_for(lambda: cell.runner._ahead)
+        assert "drive" not in cell.driver.log
+        cell.driver.tick = 0.1
+        wait_for(lambda: cell.driver.log.count("drive") == 1)
+        assert cell.driver.time >= later
+    cell.close()
+
+
 def test_a_cancel_stops_along_the_path(cell, wait_for):
     with cell.running([move(LONG), move()], wait_for) as ended:
         wait_for(cell.drives)

@@ -23,7 +23,7 @@ from ir_msgs_py.announcements import Event, ProgramState
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import Signal, magic_packet, send_packet
 from ir_msgs_py.report import PlannedMovement
-from ir_msgs_py.ros.conversions import status_to_msg
+from ir_msgs_py.ros.conversions import status_to_msg, time_from_msg
 from ir_msgs_py.ros.diagnostics import OK, WARN, Condition, Diagnostics
 from ir_msgs_py.ros.node_clients import DriverClient, PlannerClient, node_time
 from ir_msgs_py.ros.node_process import run_node
@@ -35,7 +35,7 @@ from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
 from ir_program_runner.errors import ProgramError
 from ir_program_runner.fulfilment import Fulfilment, Ports
-from ir_program_runner.machines import Machines
+from ir_program_runner.machines import MOST_SIGNALS, Machines
 from ir_program_runner.parameters import declare_parameters
 from ir_program_runner.program import (
     MOST_STEPS,
@@ -144,8 +144,11 @@ class ProgramRunnerNode(Node):
         self._signals = self.create_publisher(SignalMsg, "~/signals", _SIGNALS)
         self._machine_signals = self.create_publisher(SignalMsg, "~/machine_signals", _SIGNALS)
         self._program_state = self.create_publisher(ProgramStateMsg, "~/program_state", _KEPT)
-        for topic in ("~/signals", *(f"{peer}/machine_signals" for peer in links.peers if peer)):
-            CommandTopic(self, SignalMsg, topic, self._hear_signals, of=lambda msg: msg.name)
+        self._ahead: list[SignalMsg] = []
+        CommandTopic(self, SignalMsg, "~/signals", self._hear_signals, of=lambda msg: msg.name)
+        for peer in filter(None, links.peers):
+            topic = f"{peer}/machine_signals"
+            CommandTopic(self, SignalMsg, topic, self._hear_peer, of=lambda msg: msg.name)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(_MACHINES_PERIOD, self._let_machines_answer, clock=steady)
         self._last = Status.success()
@@ -286,7 +289,26 @@ class ProgramRunnerNode(Node):
             self.get_logger().warning(f"a signal is ignored: {error}", throttle_duration_sec=1.0)
         self._waiting.look()
 
+    def _hear_peer(self, messages: Sequence[SignalMsg]) -> None:
+        """Another robot's signals hold from their own time on, in the time of this robot's driver:
+        on a busy machine a simulated robot lags behind, and would else pass before the other left.
+        """
+        self._ahead += messages
+        self._take_peers()
+
+    def _take_peers(self) -> None:
+        if not self._ahead:
+            return
+        now = self._driver.stamp_ns
+        due = [msg for msg in self._ahead if time_from_msg(msg.stamp) <= now]
+        self._ahead = [msg for msg in self._ahead if time_from_msg(msg.stamp) > now]
+        if len(self._ahead) > MOST_SIGNALS:
+            self.get_logger().warning("signals of other robots from the future are ignored")
+            self._ahead = self._ahead[:MOST_SIGNALS]
+        self._hear_signals(due)
+
     def _let_machines_answer(self) -> None:
+        self._take_peers()
         for signal in self._machines.take_answers(self._now()):
             self._signals.publish(signal_to_msg(self._stamped(signal)))
 
