@@ -109,6 +109,17 @@ def test_brute_force_over_all_orders_and_modes_agrees(
     assert faults(problem, cycle) == []
 
 
+@pytest.mark.parametrize("seed", range(2))
+def test_brute_force_agrees_with_a_buffer_between_two_machines(seed: int) -> None:
+    """A place where a part only lies, and where there is none the next one may be put."""
+    problem = drawn(seed, 3, 3)
+    problem = replace(problem, process=(problem.process[0], 0.0, problem.process[2]))
+    period = 1.05 * shortest(problem)
+    cycle = cheapest(problem, period)
+    assert cycle.joules == pytest.approx(least_by_orders(problem, period), rel=EXACT)
+    assert faults(problem, cycle) == []
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("seed", range(3))
 def test_brute_force_agrees_for_four_machines(seed: int) -> None:

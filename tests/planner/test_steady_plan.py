@@ -217,3 +217,52 @@ def test_two_units_are_never_dearer_and_every_one_of_their_parts_is_made() -> No
 def cell_end(cell: Cell) -> str:
     assert cell.route is not None
     return cell.route.visits[-1]
+
+
+BUFFERED = {
+    "infeed_pick": ((), "raw"),
+    "washer_basket": (("raw",), "clean"),
+    "gauge_seat": (("clean",), "clean"),  # a buffer beside the washer
+    "outfeed_place": (("clean",), ""),
+}
+
+
+def with_buffer(*, at_will: bool) -> Cell:
+    """A washer, and the gauge as a place where parts may wait, or have to."""
+    visits = tuple(BUFFERED)
+    names = {name: BUFFERED.get(name, ((), "")) for name in (s.name for s in CELL.stations)}
+    stations = tuple(
+        replace(station, takes=names[station.name][0], gives=names[station.name][1])
+        for station in CELL.stations
+    )
+    machines = tuple(
+        machine if machine.name == "washer" else replace(machine, process=0.0)
+        for machine in CELL.equipment
+    )
+    assert CELL.route is not None
+    route = replace(CELL.route, visits=visits)
+    cell = replace(CELL, equipment=machines, stations=stations, route=route)
+    return replace(cell, route=replace(route, by_states=True)) if at_will else cell
+
+
+def test_a_buffer_is_used_where_that_pays_and_parts_go_through_it() -> None:
+    through = Planner(with_buffer(at_will=False), clock=lambda: 0.0)
+    at_will = Planner(with_buffer(at_will=True), clock=lambda: 0.0)
+    forced = through.plan_steady_cycle(parts_per_hour=30.0, cycles=2)
+    chosen = at_will.plan_steady_cycle(parts_per_hour=30.0)
+    assert chosen.stations == ("infeed_pick", "washer_basket", "outfeed_place")  # time to spare
+    assert chosen.joules <= forced.joules * (1.0 + SETTLED)
+    assert chosen.fastest <= forced.fastest * (1.0 + SETTLED)
+    assert forced.stations == tuple(BUFFERED)
+    assert forced.run is not None
+    names = {name for step in forced.run.movements for name in (*step.wait_for, *step.set_signals)}
+    assert {name.partition(".")[0].removeprefix("not ") for name in names} == {"washer"}
+    moved = [(step.attach or step.detach, step.to_station) for step in forced.run.movements]
+    held = [each for each in moved if each[0]]
+    first = [station for part, station in held if part == held[0][0]]
+    assert first[:6] == [
+        "infeed_pick",
+        *("washer_basket",) * 2,
+        *("gauge_seat",) * 2,
+        "outfeed_place",
+    ]

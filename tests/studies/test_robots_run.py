@@ -67,11 +67,37 @@ def off(runs: Mapping[str, RobotRun]) -> float:
     return sum(run.deviation for run in runs.values())
 
 
+def common_peak(runs: Mapping[str, RobotRun]) -> float:
+    """The most that the robots need together [W], in steps of the plant."""
+    grid = np.arange(0.0, min(run.times[-1] for run in runs.values()), LOOK)
+    joules = sum((np.interp(grid, run.times, run.joules) for run in runs.values()), np.zeros(1))
+    return float(np.diff(joules).max() / LOOK)
+
+
+@cache
+def limited() -> RobotsPlan:
+    """A limit, and waits long enough to switch the drive bus off."""
+    return plan_robots(cells(), cycle_time=90.0, peak_power=0.8 * plan().peak_power)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("late", [{}, {"left": 7.0}])
+def test_a_limit_of_the_peak_holds_at_every_shift_and_where_robots_wake_up(
+    late: dict[str, float],
+) -> None:
+    steps = [step for program in limited().programs for step in program.movements]
+    assert any("BUS_POWER_OFF" in step.power_mode for step in steps)
+    assert limited().peak_power <= 0.8 * plan().peak_power
+    runs = driven({robot: limited().run(robot, 1) for robot in limited().robots}, late)
+    assert common_peak(runs) <= limited().peak_power * (1.0 + SHARE)
+
+
 def test_two_robots_need_what_was_planned_and_keep_apart() -> None:
     runs = driven(programs())
     joules = sum(step.joules for run in runs.values() for step in run.steps)
     assert joules == pytest.approx(CYCLES * plan().joules, rel=SHARE)
     assert nearest(runs) >= MARGIN - off(runs)
+    assert common_peak(runs) <= plan().peak_power * (1.0 + SHARE)
 
 
 @pytest.mark.long

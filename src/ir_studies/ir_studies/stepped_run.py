@@ -238,12 +238,15 @@ class _Turns:
 
 
 class RobotRun(SteppedRun):
-    """One of several robots; time (N,) [s] and q (N, n) of it are in `times` and `postures`."""
+    """One of several robots; time (N,) [s], q (N, n) and what the mains gave by then (N,) [J] are
+    in `times`, `postures` and `joules`.
+    """
 
     def __init__(self, cell: Cell, plant: str, turns: _Turns, number: int) -> None:
         super().__init__(cell, plant, before_step=self._take_turn)
         self.times: list[float] = []
         self.postures: list[FloatArray] = []
+        self.joules: list[float] = []
         self.result: ProgramResult | None = None
         self._turns = turns
         self._number = number
@@ -261,6 +264,7 @@ class RobotRun(SteppedRun):
         self._turns.wait(self._number, now)
         self.times.append(now)
         self.postures.append(np.array(self.simulation.backend.q))
+        self.joules.append(self.simulation.mains.energy())
 
     def follow(self, movements: Sequence[PlannedMovement], settings: ProgramSettings) -> None:
         """Drive a program in turns with the others."""

@@ -13,7 +13,6 @@ from ir_description.cell.cell import (
     check_path,
     check_posture,
     check_processes,
-    check_route,
     check_step,
     check_switch,
     shape_register,
@@ -42,6 +41,7 @@ from ir_description.cell.equipment import (
     zone_around,
 )
 from ir_description.cell.moving import cell_in, machine_in, sweep_speeds
+from ir_description.cell.part_routes import WAYS_MAX, check_route, part_routes
 from ir_description.cell.program import (
     AUTO,
     NUMBER_MAX,
@@ -81,6 +81,7 @@ __all__ = [
     "VIA_TOLERANCE",
     "VIA_TOLERANCES",
     "VISITS",
+    "WAYS_MAX",
     "ZONE_KINDS",
     "ZONE_MAX",
     "AllowedContact",
@@ -117,6 +118,7 @@ __all__ = [
     "check_step",
     "check_switch",
     "machine_in",
+    "part_routes",
     "shape_register",
     "station_at",
     "sweep_speeds",

@@ -22,6 +22,7 @@ from ir_description.cell.equipment import (
     station_at,
     zone_around,
 )
+from ir_description.cell.part_routes import check_route, part_routes
 from ir_description.cell.program import (
     POSTURES,
     CellSignal,
@@ -272,47 +273,6 @@ def check_program(cell: _Cell) -> None:
         state = check_step(step, state, stations, signals, paths)
 
 
-def check_route(
-    route: PartRoute,
-    parts: Collection[Part],
-    machines: Collection[Equipment],
-    stations: Collection[Station],
-) -> None:
-    """Refuse a route with unknown names, whose part doesn't lie at its begin, of which two stations
-    are at the same equipment, or that doesn't visit exactly the machines with a process.
-    """
-    own = {station.name: station.equipment for station in stations}
-    for station in route.visits:
-        if station not in own:
-            raise UnknownNameError("station", station, own)
-    visited = [own[station] for station in route.visits]
-    for name in visited:
-        if visited.count(name) > 1:
-            raise InvalidValueError(
-                f"the route visits {name} {visited.count(name)} times: a machine is visited once"
-            )
-    for machine in machines:
-        works = machine.name in visited[1:-1]
-        if works and machine.process <= 0.0:
-            raise InvalidValueError(
-                f"the route visits {machine.name}, which has no process: give its time, as "
-                "process: {seconds: 30}"
-            )
-        if machine.process > 0.0 and not works:
-            raise InvalidValueError(
-                f"{machine.name} has a process of {machine.process:g} s, but the route doesn't "
-                "visit it between its first and its last station"
-            )
-    places = {part.name: part.station for part in parts}
-    if route.part not in places:
-        raise UnknownNameError("part", route.part, places)
-    if places[route.part] != route.visits[0]:
-        raise InvalidValueError(
-            f"the route of {route.part} begins at {route.visits[0]}, but it lies at "
-            f"{places[route.part] or 'no station'}"
-        )
-
-
 def check_single_places(parts: Iterable[Part]) -> None:
     """Refuse two parts that lie at one station."""
     register = NameRegister("a part at station")
@@ -488,6 +448,16 @@ class Cell:
         """Pairs of a capsule of base_link and a body that touch for good, the floor among them."""
         base = tuple((c.name, "floor") for c in self.robot.capsules if c.link == 0 and self.floor)
         return (*base, *self.base_contacts)
+
+    @property
+    def part_routes(self) -> tuple[PartRoute, ...]:
+        """All ways of the parts of its route; () without one."""
+        route = self.route
+        if route is None:
+            return ()
+        if not route.by_states:
+            return (route,)
+        return part_routes(route.part, route.handling, self.parts, self.stations)
 
     def parts_at_start(self) -> PartPlaces:
         """Return where the parts are before the program's first step."""

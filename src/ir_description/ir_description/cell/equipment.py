@@ -289,7 +289,9 @@ class Station:
 
     zone is the kind of its machine's zone. The tool leaves by approach_distance [m] along -x of the
     tcp. The allowed contacts hold inside the machine's zone only. tilt: how far the tool may lean
-    on the movement to it, None: as it likes. limits: of the movements into and out of it.
+    on the movement to it, None: as it likes. limits: of the movements into and out of it. takes:
+    states in which parts of a route may be put down there, (): any; gives: the state in which they
+    are taken, "": not said, or taken by nobody.
     """
 
     name: str
@@ -302,6 +304,8 @@ class Station:
     search: StationSearch = StationSearch()
     tilt: ToolTilt | None = None
     limits: ToolLimits = UNLIMITED
+    takes: tuple[str, ...] = ()
+    gives: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", frozen_pose(self.pose, f"pose of {self.name}"))
@@ -322,6 +326,8 @@ def station_at(
     search: StationSearch = StationSearch(),
     tilt: ToolTilt | None = None,
     limits: ToolLimits = UNLIMITED,
+    takes: tuple[str, ...] = (),
+    gives: str = "",
 ) -> Station:
     """Return a station of a machine from its pose (4, 4) in the machine's frame."""
     return Station(
@@ -335,6 +341,8 @@ def station_at(
         search=search,
         tilt=tilt,
         limits=limits,
+        takes=takes,
+        gives=gives,
     )
 
 

@@ -207,12 +207,14 @@ class PartPlaces:
 class PartRoute:
     """What every part goes through: `part` is brought from the first of `visits` (stations) to the
     next and so on. A machine works on it at each but the first, where the next one always lies, and
-    the last, which takes it away. handling [s]: of the gripper, at each end of each transport.
+    the last, which takes it away; at a buffer it only lies. handling [s]: of the gripper, at each
+    end of each transport. by_states: visits is one of the ways that the states of the part leave.
     """
 
     part: str
     visits: tuple[str, ...]
     handling: float = 0.0
+    by_states: bool = False
 
     def __post_init__(self) -> None:
         in_range(len(self.visits), *VISITS, "", "number of visits")

@@ -386,7 +386,7 @@ class _CellReader:
         if item is None:
             return None
         with item.blamed():
-            route = read_route(item)
+            route = read_route(item, parts, stations)
             check_route(route, parts, equipment, stations)
         return route
 

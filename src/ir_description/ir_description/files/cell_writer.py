@@ -194,6 +194,10 @@ def _station(station: Station) -> Iterator[str]:
     if search.withdrawal:
         yield f"withdrawal: {search.withdrawal}"
     yield from _limits(station.limits)
+    if station.takes:
+        yield f"takes: [{', '.join(station.takes)}]"
+    if station.gives:
+        yield f"gives: {station.gives}"
     yield from _block(
         "allowed_contacts",
         (
@@ -253,8 +257,8 @@ def _via(via: StepVia) -> str:
 
 
 def _route(route: PartRoute) -> str:
-    visits = ", ".join(route.visits)
-    return f"{{part: {route.part}, visits: [{visits}], handling: {_number(route.handling)}}}"
+    visits = "" if route.by_states else f"visits: [{', '.join(route.visits)}], "
+    return f"{{part: {route.part}, {visits}handling: {_number(route.handling)}}}"
 
 
 def _signals(signals: Sequence[Signal]) -> str:
@@ -335,6 +339,7 @@ def cell_hash(cell: Cell) -> str:
         cell,
         description="",
         equipment=machines,
+        stations=tuple(replace(each, takes=(), gives="") for each in cell.stations),
         program=(),
         signals=(),
         tasks=(),

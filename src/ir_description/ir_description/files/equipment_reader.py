@@ -283,6 +283,8 @@ def _size(table: Table, kind: str) -> FloatArray:
 
 
 _MACHINE_KEYS = ("pose", "zone", "states", "state", "switch", "enabled", "process", "stations")
+STATES_MAX = 20
+"""Most states of a part that one station takes."""
 _SEARCH_KEYS = ("configurations", "starts", "withdrawal")
 
 
@@ -390,7 +392,15 @@ def _process_times(table: Table) -> ProcessTimes | None:
     return ProcessTimes(float(low), float(high))
 
 
-_STATION_KEYS = ("approach_distance", "allowed_contacts", "tilt", "limits", *_SEARCH_KEYS)
+_STATE_KEYS = ("takes", "gives")
+_STATION_KEYS = (
+    "approach_distance",
+    "allowed_contacts",
+    "tilt",
+    "limits",
+    *_STATE_KEYS,
+    *_SEARCH_KEYS,
+)
 
 
 def _station(item: Item, machine: Equipment) -> Station:
@@ -406,7 +416,16 @@ def _station(item: Item, machine: Equipment) -> Station:
         _search(table),
         read_tilt(table),
         _limits(table),
+        _taken(table["takes"]) if "takes" in table else (),
+        table["gives"].name() if "gives" in table else "",
     )
+
+
+def _taken(item: Item) -> tuple[str, ...]:
+    """One state of a part, or several."""
+    if item.is_scalar():
+        return (item.name(),)
+    return tuple(each.name() for each in item.list(1, STATES_MAX))
 
 
 def read_tilt(table: Table) -> ToolTilt | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import MISSING, fields
 from typing import Any, TypedDict
 
@@ -18,11 +18,14 @@ from ir_description.cell import (
     CellPath,
     CellSignal,
     NameRegister,
+    Part,
     PartRoute,
     ProgramStep,
+    Station,
     StepVia,
     Task,
     check_posture,
+    part_routes,
 )
 from ir_description.files.equipment_reader import read_contact, read_pose, read_tilt
 from ir_description.robot import RobotModel
@@ -176,13 +179,16 @@ def _via(table: Table) -> StepVia | None:
     return StepVia(tuple(item.name() for item in table["via"].list(1, VIA_MAX)), **given)
 
 
-def read_route(item: Item) -> PartRoute:
-    """Return the route of a part."""
-    table = item.table(("part", "visits"), ("handling",))
-    visits = [visit.name() for visit in table["visits"].list(*VISITS)]
+def read_route(item: Item, parts: Collection[Part], stations: Sequence[Station]) -> PartRoute:
+    """Return the route of a part; without visits, the shortest way that its states leave."""
+    table = item.table(("part",), ("visits", "handling"))
+    part = table["part"].name()
     handling = table["handling"].number(0.0, PAUSE_MAX, "s") if "handling" in table else 0.0
+    if "visits" not in table:
+        return part_routes(part, handling, parts, stations)[0]
+    visits = [visit.name() for visit in table["visits"].list(*VISITS)]
     with table["visits"].blamed():
-        return PartRoute(table["part"].name(), tuple(visits), handling)
+        return PartRoute(part, tuple(visits), handling)
 
 
 def _signals(table: Table, key: str) -> tuple[Signal, ...]:

@@ -78,6 +78,8 @@ def _due(
         if visit.activity == 0:
             continue
         seconds = process[visit.activity - 1]
+        if seconds == 0.0:
+            continue
         loads = [each for each in cycle.visits if each.activity == visit.activity - 1]
         since = min((visit.start - each.start - each.seconds) % period for each in loads)
         lead = (visit.start - end) % period
@@ -153,11 +155,16 @@ class _Line:
         """The part at a place of the route to the next one."""
         station = self.route.visits[place]
         part = next(name for name, where in self._places.lying.items() if where == station)
-        start = place + 2 < len(self.route.visits)
-        for step in transport(self._cell, place, part, finished=place > 0, start=start):
+        finished = self._works(place)
+        start = self._works(place + 1)
+        for step in transport(self._cell, place, part, finished=finished, start=start):
             self._places = self._places.after(step)
             self.steps.append(step)
         self.started.pop(place, None)
+
+    def _works(self, place: int) -> bool:
+        """Whether a machine works on the part at a place; at a buffer it only lies."""
+        return 0 < place <= len(self.process) and self.process[place - 1] > 0.0
 
     def go(self, activity: int, following: int) -> None:
         """The empty hop from the end of an activity to the begin of another."""

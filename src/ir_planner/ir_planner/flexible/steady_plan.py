@@ -193,6 +193,8 @@ def machine_bars(plan: SteadyPlan) -> dict[str, tuple[tuple[float, float], ...]]
         if place > len(plan.process):
             continue
         seconds = plan.process[place - 1]
+        if seconds == 0.0:
+            continue
         begin = (visit.start + visit.seconds) % period
         before = min(seconds, period - begin)
         rest = ((0.0, seconds - before),) if seconds > before else ()
@@ -220,20 +222,19 @@ def plan_steady_cycle(
     bounded(cycles, 0, CYCLES_MAX, "cycles")
     bounded(units, 1, UNITS_MAX, "units")
     request = replace(request, cell=without_cycle(request.cell))
-    route = route_of(request.cell)
+    route_of(request.cell)
     request.check()
     journal = Journal(work, request.options.seed)
     journal.planner_id = "steady cycle"
     scenes = Scenes(request.cell, request.power, request.settings.drives(request.cell.robot))
     context = Context(scenes.of(request.cell.parts_at_start()), request.options, journal)
     try:
-        tending = planned_columns(request, route, context)
+        ways = _Ways(request, context)
     except StageError as failed:
         info = journal.info(request.start, context.joint_names)
         return SteadyPlan(failed.status, info)
-    model = _TendingModel(request, tending)
     with journal.stage("steady cycle") as notes:
-        fastest = model.fastest(units).seconds_per_part
+        fastest = ways.fastest(units)
         period = HOUR / parts_per_hour if parts_per_hour > 0.0 else fastest * _SLACK
         if period < fastest - _ROUNDING:
             raise RequestError(
@@ -241,8 +242,10 @@ def plan_steady_cycle(
                 f"parts_per_hour is {parts_per_hour:g}, one in {period:.2f} s: at most "
                 f"{HOUR / fastest:.2f} are possible, one in {fastest:.2f} s",
             )
-        chosen = model.cheapest(max(period, fastest * _SLACK), units)
+        model, chosen = ways.cheapest(max(period, fastest * _SLACK), units)
         notes.append(f"{chosen.cycle.period:.2f} s, {chosen.cycle.joules:.0f} J")
+    request = model.request
+    tending = model.tending
     try:
         made = CycleSteps(request, tending, chosen.cycle, chosen.movements, context)
     except StageError as failed:
@@ -251,7 +254,7 @@ def plan_steady_cycle(
         status=Status.success(),
         info=journal.info(request.start, context.joint_names),
         parts_per_hour=parts_per_hour,
-        stations=route.visits,
+        stations=tending.route.visits,
         machines=machines_of(request.cell),
         process=model.problem.process,
         problem=model.problem,
@@ -275,7 +278,7 @@ def plan_steady_cycle(
         plan = replace(plan, run=program_of(steps), run_cell=run_cell)
     if front_points:
         with journal.stage("front"):
-            plan = replace(plan, front=_front(model, fastest, front_points, units))
+            plan = replace(plan, front=_front(ways, fastest, front_points, units))
     return replace(plan, info=journal.info(request.start, context.joint_names))
 
 
@@ -285,7 +288,7 @@ class _Chosen:
 
     cycle: SteadyCycle
     movements: Mapping[UnitKey, Movement]
-    bound: float
+    bound: float  # J of a cycle
 
     @property
     def gap(self) -> float:
@@ -296,6 +299,7 @@ class _TendingModel:
     """The linear problem of a route, and its solutions as certified movements."""
 
     def __init__(self, request: ProgramRequest, tending: Tending) -> None:
+        self.request = request
         self.tending = tending
         visits = tending.route.visits
         self.visits = visits
@@ -349,11 +353,11 @@ class _TendingModel:
         found = [cycle for cycle in cycles if cycle is not None]  # without a bound there is one
         return min(found, key=lambda cycle: cycle.seconds_per_part)
 
-    def cheapest(self, period: float, units: int) -> _Chosen:
+    def cheapest(self, period: float, units: int) -> _Chosen | None:
         """The cheapest cycle of at most so many units within a period a part [s]."""
         found = [self._cheapest(period, count) for count in range(1, units + 1)]
-        known = [chosen for chosen in found if chosen is not None]  # one can be as fast as that
-        return min(known, key=lambda chosen: chosen.cycle.joules_per_part)
+        known = [chosen for chosen in found if chosen is not None]
+        return min(known, key=lambda chosen: chosen.cycle.joules_per_part, default=None)
 
     def _cheapest(self, period: float, units: int) -> _Chosen | None:
         """Of exactly so many units, of movements that are certified at the durations that the
@@ -405,6 +409,46 @@ class _TendingModel:
         return replace(self.problem, own=own, own_hops=hops)
 
 
+class _Ways:
+    """The ways of a part through the cell, each with its model; the first one has the fewest
+    visits. Raises StageError where no way can be driven.
+    """
+
+    def __init__(self, request: ProgramRequest, context: Context) -> None:
+        self._models: list[_TendingModel] = []
+        failures = []
+        for way in request.cell.part_routes:
+            route = replace(way, by_states=False)
+            own = replace(request, cell=replace(request.cell, route=route))
+            try:
+                tending = planned_columns(own, route, context)
+            except StageError as failed:
+                failures.append(failed)
+                continue
+            self._models.append(_TendingModel(own, tending))
+        if not self._models:
+            raise failures[0]
+
+    @property
+    def longest(self) -> float:
+        """A period [s] for one unit that suffices on every way."""
+        return max(model.problem.longest for model in self._models)
+
+    def fastest(self, units: int) -> float:
+        """The shortest period a part [s]."""
+        return min(model.fastest(units).seconds_per_part for model in self._models)
+
+    def cheapest(self, period: float, units: int) -> tuple[_TendingModel, _Chosen]:
+        """The way of the cheapest cycle within a period a part [s] that one of them keeps, and the
+        cycle, whose bound is that of all ways.
+        """
+        found = [(model, model.cheapest(period, units)) for model in self._models]
+        known = [(model, chosen) for model, chosen in found if chosen is not None]
+        model, best = min(known, key=lambda each: each[1].cycle.joules_per_part)
+        bound = min(chosen.bound / chosen.cycle.units for _, chosen in known)
+        return model, replace(best, bound=min(bound * best.cycle.units, best.bound))
+
+
 def wait_modes(rests: Rests) -> tuple[WaitMode, ...]:
     """The sequences of modes that a wait of known length can be spent in, each ready at its end."""
     modes = [WaitMode(MOTORS, 0.0, rests.timer, 0.0, rests.motors)]
@@ -417,16 +461,16 @@ def wait_modes(rests: Rests) -> tuple[WaitMode, ...]:
     return tuple(modes)
 
 
-def _front(model: _TendingModel, fastest: float, count: int, units: int) -> tuple[CyclePoint, ...]:
+def _front(ways: _Ways, fastest: float, count: int, units: int) -> tuple[CyclePoint, ...]:
     """Cycles from the fastest on to the cheapest of all, by even steps of their period; at a
     lower throughput what is cheaper at a higher one is kept.
     """
-    free = model.cheapest(model.problem.longest, units)
+    _, free = ways.cheapest(ways.longest, units)
     begin = fastest * _SLACK
     end = max(free.cycle.seconds_per_part, begin)
     points: list[CyclePoint] = []
     for period in np.linspace(begin, end, count):
-        chosen = model.cheapest(float(period), units)
+        _, chosen = ways.cheapest(float(period), units)
         seconds = chosen.cycle.seconds_per_part
         joules = chosen.cycle.joules_per_part
         point = CyclePoint(HOUR / seconds, seconds, joules, chosen.gap)

@@ -91,8 +91,9 @@ class Replay:
         drives = request.settings.drives(self._cell.robot)
         places = self._cell.parts_at_start()
         self._scene = Scenes(self._cell, request.power, drives).of(places)
-        names = machines_of(self._cell)[1:-1]
-        self._assumed = {name: self._cell.machine(name).process for name in names}
+        times = {name: self._cell.machine(name).process for name in machines_of(self._cell)[1:-1]}
+        names = [name for name, seconds in times.items() if seconds > 0.0]
+        self._assumed = {name: times[name] for name in names}
         self._starts = {start_of(name): name for name in names}
         self._answers = {done_of(name): name for name in names}
         self._begins = np.concatenate(([0.0], np.cumsum([s.duration for s in self._steps])))

@@ -209,6 +209,8 @@ def with_signals(
     signals = {signal.name: signal for signal in standing.signals}
     done = tuple(finished)
     for place in range(1, len(route.visits) - 1):
+        if not cell.machine(names[place]).process:
+            continue
         start = start_of(names[place])
         end = done_of(names[place])
         signals[start] = replace(signals.get(start, CellSignal(start)), initial=place in done)
