@@ -1,6 +1,6 @@
 """Is the cheapest cycle of a robotic cell found and proved, and how soon?
 
-    python benchmarks/cells.py [--only drawn|flexible|driven|robots] [--file FILE.xml]...
+    python benchmarks/cells.py [--only drawn|steady|flexible|driven|robots] [--file FILE.xml]...
                                [--seeds N] [--seconds S] [--quick] [--json FILE]
 
 Cells drawn at random that have a schedule by construction, and instances of the public benchmark
@@ -8,6 +8,9 @@ where --file names them. Each is solved by the project's model and by the publis
 solver and invocation, each with as many seconds of processor time; a judge that knows only the file
 checks every schedule and its energy. The laws: every schedule is valid, costs what it says, and is
 proved; the published model, with its ten segments per curve, never proves a bound above it.
+
+steady: drawn cells of one robot that tends up to six machines, cycles of one and of two parts; up
+to four machines beside brute force over all orders and modes (motors alone for four).
 
 flexible: the bundled cell of that name at 30 parts an hour, with what is saved against the common
 cycle of the same order, which moves at 100 % and leaves waits to the controller's own timers.
@@ -35,18 +38,24 @@ from _cells_judge import energy, faults
 from _cells_published import PublishedModel
 from _results import Claim, at_least, at_most, command_line, finish, line_of
 from _robots_judge import Judge, drawn_cell, driven
+from _steady_judge import MODES, least_by_orders
+from _steady_judge import drawn as drawn_machines
 
 from ir_description import RobotCells, load_robot_cells
 from ir_planner import Planner, ProgramPlan, RequestError
+from ir_planner.cycle import cheapest_cycle, fastest_cycle
 from ir_planner.robots import RobotsPlan, plan_robots
 from ir_recorder.analysis.tending import tending_of
 from ir_studies.cells import CellAnswer, read_instances, solve_cell, written
 from ir_studies.stepped_run import driven_program
 
+PARTS = ("drawn", "steady", "flexible", "driven", "robots")
 SIZES = ((2, 6), (3, 6), (3, 9))  # robots and stops of each
 LARGE = ((5, 10), (8, 10))
 PARTS_PER_HOUR = 30.0
 CYCLES = 4
+MACHINES = 6
+BRUTE = 4  # machines of which all orders are tried
 
 
 @dataclass(frozen=True)
@@ -63,6 +72,21 @@ class Row:
     seconds: float
     published: float
     published_seconds: float
+
+
+@dataclass(frozen=True)
+class SteadyRow:
+    """A drawn cell of one robot: joules of the cycle, gap [%], what brute force finds (nan: too
+    many orders), processor seconds of the cheapest cycle.
+    """
+
+    machines: int
+    units: int
+    seed: int
+    joules: float
+    gap: float
+    brute: float
+    seconds: float
 
 
 @dataclass(frozen=True)
@@ -126,20 +150,22 @@ class DrivenRow:
 def main() -> None:
     """Solve, judge, compare."""
     parser = command_line(__doc__, ["drawn"], 5, "two seeds, no large cells")
-    parser.add_argument(
-        "--only", choices=("drawn", "flexible", "driven", "robots"), help="one part of it"
-    )
+    parser.add_argument("--only", choices=PARTS, help="one part of it")
     parser.add_argument("--file", action="append", default=[], help="instances of the benchmark")
     parser.add_argument("--seconds", type=float, default=120.0, help="of processor time")
     arguments = parser.parse_args()
     seeds = 2 if arguments.quick else arguments.seeds
     seconds = min(arguments.seconds, 20.0) if arguments.quick else arguments.seconds
-    rows: list[Row | FlexibleRow | DrivenRow | RobotsRow] = []
+    rows: list[Row | SteadyRow | FlexibleRow | DrivenRow | RobotsRow] = []
     claims: list[Claim] = []
     if arguments.only in (None, "robots"):
         robots = list(robots_rows(4 if arguments.quick else 30))
         claims += robots_claims(robots, 6 if arguments.quick else 100)
         rows += robots
+    if arguments.only in (None, "steady"):
+        steady = list(steady_rows(1 if arguments.quick else 3))
+        claims += steady_claims(steady)
+        rows += steady
     if arguments.only in (None, "flexible"):
         flexible = flexible_row()
         print(line_of(asdict(flexible)), flush=True)
@@ -230,6 +256,47 @@ def robots_claims(rows: list[RobotsRow], schedules: int) -> list[Claim]:
         at_most("robots: cells with a pair nearer than S_m", near, "", 0),
         at_least("robots: cells in which planted collisions are found", planted, "", 1),
         at_most("robots: largest gap", max(row.gap for row in planned), "%", 5.0),
+    ]
+
+
+def steady_rows(seeds: int) -> Iterator[SteadyRow]:
+    """Drawn machines, 2 % above the period of the shortest cycle."""
+    for machines in range(2, MACHINES + 1):
+        for seed in range(seeds):
+            problem = drawn_machines(seed, machines, 3)
+            if machines == BRUTE:  # brute force over their modes too would take hours
+                problem = replace(problem, before=(MODES[:1],) * (machines + 1))
+            fastest = fastest_cycle(problem)
+            assert fastest is not None
+            period = 1.02 * fastest.period
+            brute = least_by_orders(problem, period) if machines <= BRUTE else np.nan
+            for units in (1, 2):
+                begin = time.process_time()
+                cycle = cheapest_cycle(problem, period=period, units=units)
+                seconds = time.process_time() - begin
+                assert cycle is not None
+                gap = 100.0 * (cycle.joules - cycle.bound) / cycle.joules
+                row = SteadyRow(
+                    machines,
+                    units,
+                    seed,
+                    cycle.joules,
+                    gap,
+                    brute if units == 1 else np.nan,
+                    seconds,
+                )
+                print(line_of(asdict(row)), flush=True)
+                yield row
+
+
+def steady_claims(rows: list[SteadyRow]) -> list[Claim]:
+    """Exact, soon, and what brute force finds."""
+    off = [abs(row.joules - row.brute) / row.brute for row in rows if np.isfinite(row.brute)]
+    return [
+        at_least("steady: machines of the largest cell", max(r.machines for r in rows), "", 6),
+        at_most("steady: largest gap", max(row.gap for row in rows), "%", 1e-3),
+        at_most("steady: joules off brute force", 100.0 * max(off), "%", 0.5),
+        at_most("steady: longest processor time", max(row.seconds for row in rows), "s", 60.0),
     ]
 
 

@@ -157,7 +157,7 @@ REFUSED = {
         "      - {station: table_seat, attach: gear, dwell: 0.5}\n",
         "      - {station: table_seat, attach: gear, wait_for: [ready]}\n",
         0.0,
-        "step 1 of the program of right waits for ready",
+        "step 1 of the program of right waits for ready, which follows nothing that this program",
     ),
     "ends with a part": (
         "{station: outfeed_place, detach: gear, dwell: 0.5}",
@@ -184,7 +184,14 @@ REFUSED = {
         "    pose: {xyz: [1.9, 0, 0]}\n",
         "    pose: {xyz: [1.9, 0, 0]}\n    process: {seconds: 20}\n",
         0.0,
-        "table has a process of 20 s: processes aren't planned with several robots",
+        "table has a process of 20 s, and nobody begins it and waits for its end",
+    ),
+    "a first wait without end": (
+        "    program:\n      - {station: infeed_pick, attach: gear, dwell: 0.5}\n",
+        "    program:\n      - {station: infeed_pick, attach: gear, wait_for: [done], "
+        "set_signals: [ready]}\n",
+        0.0,
+        "the movement to infeed_pick waits for done before the program sets ready",
     ),
     "a machine that changes": (
         "    pose: {xyz: [1.9, 0, 0]}\n",
@@ -199,7 +206,9 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_makes_no_sense_is_refused_by_a_sentence(case: str, tmp_path: Path) -> None:
     before, after, period, sentence = REFUSED[case]
-    text = TEXT.replace("floor: true\n", "floor: true\nsignals: [{name: ready}]\n")
+    text = TEXT.replace(
+        "floor: true\n", "floor: true\nsignals: [{name: ready}, {name: done, follows: ready}]\n"
+    )
     text = text.replace(before, after, 1) if before else text
     if "switch:" in after:
         text = text.replace("attach: gear, dwell: 0.5}", "attach: gear, set_signals: [ready]}", 1)

@@ -25,6 +25,8 @@ MARGIN = 0.02  # m: S_m
 LOOK = 0.005  # s: 1 cm of the tools
 SHARE = 0.01  # of joules
 CYCLES = 2
+DATA = File(__file__).parents[2] / "src/ir_description/ir_description/data"
+CELL = DATA / "robot_cells/two_robots.yaml"
 
 
 @cache
@@ -114,6 +116,46 @@ def test_a_planted_wrong_order_is_found() -> None:
         for robot, steps in programs().items()
     }
     assert nearest(driven(free, {"right": 4.0})) < 0.0
+
+
+FEEDER = 20.0  # s until the next blank lies there
+
+
+def fed_cells(folder: File) -> RobotCells:
+    """The infeed brings the next blank when it is told that the last one was taken."""
+    changes = {
+        "floor: true\n": "floor: true\nsignals:\n  - {name: feed}\n"
+        "  - {name: fed, follows: feed, process: infeed, initial: true}\n",
+        "  - name: infeed\n": f"  - name: infeed\n    process: {{seconds: {FEEDER}}}\n",
+        "infeed_pick, attach: gear,": "infeed_pick, attach: gear, wait_for: [fed], "
+        "set_signals: [feed],",
+    }
+    text = CELL.read_text("utf-8")
+    for before, after in changes.items():
+        assert before in text
+        text = text.replace(before, after, 1)
+    path = folder / "fed.yaml"
+    path.write_text(text)
+    found = load_robot_cells(path)
+    assert found is not None
+    return found
+
+
+@pytest.mark.long
+def test_a_machine_of_one_robot_is_waited_for_and_never_too_early(tmp_path: File) -> None:
+    several = fed_cells(tmp_path)
+    fed = plan_robots(several)
+    assert fed.fastest > FEEDER
+    assert fed.certified
+    given = {robot: fed.run(robot, 3) for robot in fed.robots}
+    runs = driven_robots(several.by_name, given, signal_timeout=60.0)
+    left = runs["left"]
+    told = [s.end for s in left.steps if "feed" in " ".join(s.movement.set_signals)]
+    gone = [s.start for s in left.steps if "fed" in " ".join(s.movement.wait_for)]
+    assert len(told) == len(gone) == 3
+    for earlier, later in zip(told, gone[1:], strict=False):
+        assert later - earlier >= FEEDER - 0.01
+    assert left.times[-1] == pytest.approx(3 * fed.period, rel=0.02)
 
 
 @pytest.mark.long

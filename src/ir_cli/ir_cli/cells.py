@@ -104,10 +104,11 @@ class _Looked:
 def _refused(several: RobotCells, robot: str) -> Iterator[Finding]:
     """Why a robot's program can't be planned together with the others'."""
     from ir_planner import RequestError
-    from ir_planner.robots import check_places, check_repeatable
+    from ir_planner.robots import check_places, check_processes, check_repeatable
 
     try:
         check_repeatable(robot, several.of_robot(robot))
+        check_processes(several.by_name)
         check_places(several)
     except RequestError as error:
         yield Finding("error", robot, str(error))

@@ -23,14 +23,25 @@ _SERIAL = 2.0  # times the seconds of one robot after the other: no shortest cyc
 
 
 @dataclass(frozen=True)
+class Lag:
+    """The movement `later` begins at least so many seconds after `earlier` has ended."""
+
+    earlier: int
+    later: int
+    seconds: float
+
+
+@dataclass(frozen=True)
 class ArmWork:
     """movements: the curve of each; standing: seconds of what is done before each, and its joules;
-    modes: of the wait that may follow that.
+    modes: of the wait that may follow that. lags: between movements of the same cycle where the
+    later one comes after the earlier one, else of one cycle and the next.
     """
 
     movements: tuple[Curve, ...]
     standing: tuple[tuple[float, float], ...]
     modes: tuple[tuple[WaitMode, ...], ...]
+    lags: tuple[Lag, ...] = ()
 
     @property
     def shortest(self) -> float:
@@ -89,7 +100,8 @@ def shortest_joint(works: Sequence[ArmWork], zones: Sequence[Zone]) -> JointCycl
     """The shortest cycle; None where the zones leave none."""
     alone = max(work.shortest for work in works)
     together = sum(work.shortest for work in works)
-    model = _Model(works, zones, (alone, _SERIAL * together))
+    lags = sum(lag.seconds for work in works for lag in work.lags)
+    model = _Model(works, zones, (alone, _SERIAL * together + lags))
     return model.solve({model.period: 1.0})
 
 
@@ -158,6 +170,13 @@ class _Model:
             self._parts[robot].append(parts)
             self._waits[robot].append(waits)
         program.row({begin[-1]: 1.0, begin[0]: -1.0, self.period: -1.0}, low=0.0, high=0.0)
+        for lag in work.lags:
+            after = begin[lag.later]
+            terms = {after: 1.0, begin[lag.earlier]: -1.0}
+            terms |= {part: -1.0 for part, _ in self._parts[robot][lag.earlier]}
+            if lag.later <= lag.earlier:
+                terms[self.period] = 1.0
+            program.row(terms, low=lag.seconds + work.movements[lag.earlier].seconds[0])
         return begin
 
     def _end(self, stretch: Stretch) -> tuple[dict[int, float], float]:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 
@@ -226,7 +226,9 @@ class _Model:
         count = len(problem.activities)
         self.nodes: list[Node] = [(a, u) for a in range(count) for u in range(units)]
         self.first = self.nodes[0]
-        self.period = self.program.variable(0.0, period, cost=float(fastest))
+        self._travel = _shortest_travel(problem)
+        self.least = min(self._least_period(), period)
+        self.period = self.program.variable(self.least, period, cost=float(fastest))
         self.start = {node: self._time(node) for node in self.nodes}
         self.duration: dict[Node, dict[int, float]] = {}
         for node in self.nodes:
@@ -241,11 +243,37 @@ class _Model:
         self.hop: dict[Arc, dict[int, float]] = {}
         self._successors()
         self._times()
+        self._first_unit()
         for machine in range(len(problem.process)):
             self._machine(machine)
 
+    def _least_period(self) -> float:
+        """What the busiest machine takes for its parts, from one load to the next."""
+        busiest = 0.0
+        for machine, process in enumerate(self.problem.process):
+            shortest = [
+                min(self.problem.activity((a, unit)).seconds[0] for unit in range(self.units))
+                for a in (machine, machine + 1)
+            ]
+            own = process + sum(shortest) + self._travel[machine + 1, machine]
+            busiest = max(busiest, own)
+        return self.units * busiest
+
     def _time(self, node: Node) -> int:
-        return self.program.variable(0.0, 0.0 if node == self.first else self.most)
+        """When an activity starts, no sooner than the robot can be there and back in time."""
+        if node == self.first:
+            return self.program.variable(0.0, 0.0)
+        soonest = self._soonest(node)
+        return self.program.variable(soonest, max(self._latest(node), soonest))
+
+    def _soonest(self, node: Node) -> float:
+        first = self.problem.activity(self.first).seconds[0]
+        return first + self._travel[self.first[0], node[0]]
+
+    def _latest(self, node: Node) -> float:
+        """Within the longest period; below 0 where that is too short."""
+        back = self._travel[node[0], self.first[0]]
+        return self.most - self.problem.activity(node).seconds[0] - back
 
     def _cost(self, joules: float) -> int:
         """A variable that is 1: what is spent anyway."""
@@ -291,7 +319,12 @@ class _Model:
                 joules = 0.0 if curve is None else curve.joules[0]
                 self.taken[arc] = program.binary(cost=self.price * joules)
                 self.flow[arc] = program.variable(0.0, self.most)
-                program.row({self.flow[arc]: 1.0, self.taken[arc]: -self.most}, high=0.0)
+                most = self.most if other == self.first else self._latest(other)
+                program.row({self.flow[arc]: 1.0, self.taken[arc]: -most}, high=0.0)
+                least = self.problem.activity(node).seconds[0]
+                least += 0.0 if curve is None else curve.seconds[0]
+                least += 0.0 if node == self.first else self._soonest(node)
+                program.row({self.flow[arc]: 1.0, self.taken[arc]: -least}, low=0.0)
                 self.hop[arc] = (
                     {} if curve is None else self._segments(curve, self.taken[arc], self.taken[arc])
                 )
@@ -300,6 +333,19 @@ class _Model:
             into = {x: 1.0 for (_, b), x in self.taken.items() if b == node}
             program.row(out, low=1.0, high=1.0)
             program.row(into, low=1.0, high=1.0)
+        self._one_tour()
+
+    def _one_tour(self) -> None:
+        """No activities are a tour of their own, in all their units."""
+        count = len(self.problem.activities)
+        for size in range(2, count):
+            for own in combinations(range(count), size):
+                inside = {
+                    taken: 1.0
+                    for (one, other), taken in self.taken.items()
+                    if one[0] in own and other[0] in own
+                }
+                self.program.row(inside, high=float(size * self.units - 1))
 
     def _times(self) -> None:
         """What flows out of an activity is when the next one is reached."""
@@ -337,7 +383,13 @@ class _Model:
             free[turn] = free.get(turn, 0.0) + (1.0 if unit == self.units - 1 else -1.0)
             if unit < self.units - 1:
                 free[self.period] = 1.0
-            self.program.row(free, low=0.0)
+            self.program.row(free, low=self._travel[machine + 1, machine])
+
+    def _first_unit(self) -> None:
+        """Where the units are alike, the second one begins in the first half of the period."""
+        alike = not self.problem.own and not self.problem.own_hops
+        if self.units > 1 and alike:
+            self.program.row({self.start[0, 1]: 1.0, self.period: -0.5}, high=0.0)
 
     def _shift(self) -> int:
         """A time that is 0 or the period."""
@@ -346,6 +398,8 @@ class _Model:
         self.program.row({shift: 1.0, self.period: -1.0}, high=0.0)
         self.program.row({shift: 1.0, whole: -self.most}, high=0.0)
         self.program.row({shift: 1.0, self.period: -1.0, whole: -self.most}, low=-self.most)
+        self.program.row({shift: 1.0, whole: -self.least}, low=0.0)
+        self.program.row({shift: 1.0, self.period: -1.0, whole: -self.least}, high=-self.least)
         return shift
 
     def solve(self, stopped: Callable[[], bool] | None) -> SteadyCycle | None:
@@ -379,6 +433,24 @@ class _Model:
             for mode, chosen, seconds in self.waits[where, node]
             if values[chosen] > 0.5 and values[seconds] > 0.0
         )
+
+
+def _shortest_travel(problem: SteadyProblem) -> dict[tuple[int, int], float]:
+    """Least seconds from the end of each activity to the begin of each, over others or not."""
+    count = len(problem.activities)
+    units = range(UNITS_MAX)
+    travel = {}
+    for a in range(count):
+        for b in range(count):
+            curves = [problem.hop((a, unit), b) for unit in units]
+            travel[a, b] = min(0.0 if curve is None else curve.seconds[0] for curve in curves)
+    moving = [min(problem.activity((a, u)).seconds[0] for u in units) for a in range(count)]
+    for over in range(count):
+        for a in range(count):
+            for b in range(count):
+                longer = travel[a, over] + moving[over] + travel[over, b]
+                travel[a, b] = min(travel[a, b], longer)
+    return travel
 
 
 def _sum(terms: Mapping[int, float], values: FloatArray) -> float:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_description import Capsule, Cell, Equipment
+from ir_description import Capsule, Cell, CellSignal, Equipment
 from ir_kernels.swept import SweptArm
+from ir_msgs_py.plc import Signal
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import clearance_violation
-from ir_planner.cycle import ArmSchedule, ArmWork, Wait
+from ir_planner.cycle import ArmSchedule, ArmWork, Lag, Wait
 from ir_planner.errors import RequestError
 from ir_planner.flexible import RUNGS, Column, slowed_down, wait_modes
 from ir_planner.program import (
@@ -120,6 +121,7 @@ class ArmProgram:
             tuple(curves),
             tuple((stop.seconds, _joules(stop.pauses)) for stop in self.stops),
             tuple(wait_modes(rests_at(stop.q, stop.scene, times)) for stop in self.stops),
+            _lags(self.cell, self.steps),
         )
 
     def taking(self, schedule: ArmSchedule) -> list[Movement]:
@@ -172,7 +174,7 @@ class ArmProgram:
                 trajectory_id=trajectory.trajectory_id,
                 duration=trajectory.duration,
                 report=movement.report,
-                wait_for=signals[k][0],
+                wait_for=(*step.wait_for, *signals[k][0]),
                 set_signals=(*step.set_signals, *signals[k][1]),
             )
             steps.append(charge.moved(moving, movement.energy, movement.context.scene))
@@ -212,24 +214,19 @@ def planned_arm(robot: str, request: ProgramRequest, journal: Journal) -> ArmPro
 
 
 def check_repeatable(robot: str, cell: Cell) -> None:
-    """Refuse, by RequestError, what no cycle of several robots is planned with: machines that work
-    or change, signals of machines, a program without movements or one that ends with a part in the
-    gripper.
+    """Refuse, by RequestError, what no cycle of several robots is planned with: machines that
+    change, waits for what this program doesn't bring about, a program without movements or one that
+    ends with a part in the gripper.
     """
     switches = {m.switch.signal: m.name for m in cell.equipment if m.switch is not None}
-    for machine in cell.equipment:
-        if machine.process > 0.0:
-            raise RequestError(
-                StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"{machine.name} has a process of {machine.process:g} s: processes aren't planned "
-                "with several robots yet; leave it out, and let a program dwell instead",
-            )
     if not any(step.kind != "PAUSE" for step in cell.program):
         raise RequestError(
             StatusCode.INVALID_GOAL_CONSTRAINTS,
             f"the program of {robot} has no movement: give it one that ends with "
             "{posture: park}, or leave the robot out",
         )
+    own = [signal for step in cell.program for signal in step.set_signals]
+    answers = {signal.name: signal for signal in cell.signals if signal.follows}
     places = cell.parts_at_start()
     for k, step in enumerate(cell.program, start=1):
         for signal in step.set_signals:
@@ -240,13 +237,16 @@ def check_repeatable(robot: str, cell: Cell) -> None:
                     f"{signal.name}: machines that change aren't planned with several robots yet, "
                     "since the others would have to know; leave it in one state",
                 )
-        if step.wait_for:
-            raise RequestError(
-                StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"step {k} of the program of {robot} waits for {step.wait_for[0].name}: signals of "
-                "machines aren't planned with several robots yet, and those between robots follow "
-                "from the movements; leave it out",
-            )
+        for signal in step.wait_for:
+            answer = answers.get(signal.name)
+            if answer is None or _asked(answer, signal) not in own:
+                raise RequestError(
+                    StatusCode.INVALID_GOAL_CONSTRAINTS,
+                    f"step {k} of the program of {robot} waits for {signal.name}, which follows "
+                    "nothing that this program sets: of the signals of machines only those are "
+                    "planned with several robots, and those between robots follow from the "
+                    "movements; leave it out",
+                )
         places = places.after(step)
     if places.held:
         raise RequestError(
@@ -254,6 +254,65 @@ def check_repeatable(robot: str, cell: Cell) -> None:
             f"the program of {robot} ends with {places.held} in the gripper, so it can't be "
             "repeated: let it detach that at a station",
         )
+
+
+def _asked(answer: CellSignal, awaited: Signal) -> Signal:
+    """What has to be set so that a signal takes the level that is awaited."""
+    return Signal(answer.follows, awaited.value or answer.process != "")
+
+
+def check_processes(cells: Mapping[str, Cell]) -> None:
+    """Refuse, by RequestError, a machine with a process that no program, or that of more than one
+    robot, begins. cells: by robot.
+    """
+    for machine in next(iter(cells.values())).equipment:
+        if machine.process == 0.0:
+            continue
+        robots = [robot for robot, cell in cells.items() if _begins(cell, machine.name)]
+        if len(robots) != 1:
+            who = " and ".join(robots) or "nobody"
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"{machine.name} has a process of {machine.process:g} s, and {who} begins it and "
+                "waits for its end: with several robots one program does both, by a signal and one "
+                "that follows it with `process`; or leave it out, and let a program dwell instead",
+            )
+
+
+def _begins(cell: Cell, machine: str) -> bool:
+    """Whether the program of a cell sets the signal that begins a process and waits for its end."""
+    ends = {signal.name: signal.follows for signal in cell.signals if signal.process == machine}
+    awaited = {ends.get(signal.name) for step in cell.program for signal in step.wait_for}
+    given = {signal.name for step in cell.program for signal in step.set_signals if signal.value}
+    return bool(awaited & given)
+
+
+def _lags(cell: Cell, steps: Sequence[PlannedMovement]) -> tuple[Lag, ...]:
+    """Between movements that set signals and those that wait for what follows them. Raises
+    RequestError for a wait of the first cycle that nothing ends.
+    """
+    answers = {signal.name: signal for signal in cell.signals if signal.follows}
+    lags = []
+    for later, step in enumerate(steps):
+        for signal in map(Signal.parse, step.wait_for):
+            answer = answers[signal.name]
+            asked = _asked(answer, signal)
+            setters = [
+                k for k, each in enumerate(steps) if asked in map(Signal.parse, each.set_signals)
+            ]
+            before = [k for k in setters if k < later]
+            if not before and answer.initial != signal.value:
+                raise RequestError(
+                    StatusCode.INVALID_GOAL_CONSTRAINTS,
+                    f"the movement to {step.to_station} waits for {signal.name} before the program "
+                    f"sets {answer.follows}, so the first cycle waits for ever: give "
+                    f"{signal.name} the level that it waits for as `initial`",
+                )
+            seconds = answer.delay
+            if answer.process:
+                seconds = cell.machine(answer.process).process if signal.value else 0.0
+            lags.append(Lag(before[-1] if before else setters[-1], later, seconds))
+    return tuple(lags)
 
 
 def _planned(robot: str, request: ProgramRequest, journal: Journal) -> ArmProgram:
@@ -303,10 +362,10 @@ def _arm(
     moving: list[PlannedMovement] = []
     for step in steps:
         if step.is_pause:
-            if step.attach or step.detach or step.set_signals:
+            if step.attach or step.detach or step.set_signals or step.wait_for:
                 raise RequestError(
                     StatusCode.INVALID_GOAL_CONSTRAINTS,
-                    f"the program of {robot} handles something where it already stands "
+                    f"the program of {robot} handles something, or waits, where it already stands "
                     f"({step.to_station}): with several robots a step that does has to move",
                 )
             before[-1].append(step)

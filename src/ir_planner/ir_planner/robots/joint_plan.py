@@ -29,7 +29,7 @@ from ir_planner.planner import Planner
 from ir_planner.presentation import plot_robots
 from ir_planner.program import MOTORS, ProgramPlan, StageError, program_of
 from ir_planner.request import Journal, bounded
-from ir_planner.robots.arm_program import ArmProgram, check_repeatable, planned_arm
+from ir_planner.robots.arm_program import ArmProgram, check_processes, check_repeatable, planned_arm
 from ir_planner.robots.meetings import (
     Cells,
     Meetings,
@@ -151,6 +151,7 @@ def plan_robots(
     planners = tuple(Planner(cell, settings=settings) for cell in cells.cells)
     for robot in cells.robots:
         check_repeatable(robot, cells.of_robot(robot))
+    check_processes(cells.by_name)
     check_places(cells)
     arms: list[ArmProgram] = []
     try:

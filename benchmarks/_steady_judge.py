@@ -1,4 +1,5 @@
-"""Brute force over the cycles of a robot that tends machines: an independent judge.
+"""Machines, curves and modes drawn at random for a robot that tends them, and brute force over its
+cycles: an independent judge.
 
 It knows nothing of linear programs over orders: every order is tried, every choice of modes, and
 durations on a grid, or (where the grid would be too large) times by a linear program of SciPy's for
@@ -8,14 +9,50 @@ that one order and those modes.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise, permutations, product
 
 import numpy as np
 from scipy.optimize import linprog
 
-from ir_planner.cycle import SteadyProblem, WaitMode
+from ir_planner.cycle import Curve, SteadyProblem, WaitMode
 
+MODES = (
+    WaitMode("motors", 0.0, 20.0, 0.0, 900.0),
+    WaitMode("brakes", 1.5, 1e4, 900.0, 300.0),
+)
 NONE = WaitMode("", 0.0, 0.0, 0.0, 0.0)
+
+
+def drawn_curve(rng: np.random.Generator, low: float, points: int) -> Curve:
+    """Energy that falls with the square of the speed, and watts that are always there."""
+    begin = rng.uniform(low, 3.0 * low)
+    seconds = begin + np.concatenate([[0.0], np.cumsum(rng.uniform(0.3, 1.5, points - 1))])
+    joules = rng.uniform(800.0, 6000.0) * (begin / seconds) ** 2 + rng.uniform(200, 600) * seconds
+    return Curve.below(zip(seconds.tolist(), joules.tolist(), strict=True))
+
+
+def drawn(seed: int, machines: int, points: int = 4) -> SteadyProblem:
+    rng = np.random.default_rng([seed, machines])
+    count = machines + 1
+    return SteadyProblem(
+        activities=tuple(drawn_curve(rng, 2.0, points) for _ in range(count)),
+        hops={
+            (j, i): drawn_curve(rng, 1.0, points)
+            for j in range(count)
+            for i in range(count)
+            if i not in (j, j + 1)
+        },
+        after=((),) * count,
+        before=(MODES,) * count,
+        process=tuple(rng.uniform(2.0, 30.0, machines).tolist()),
+    )
+
+
+def one_hop(problem: SteadyProblem) -> SteadyProblem:
+    """The same with hops of one duration each, the shortest."""
+    hops = {arc: Curve(curve.seconds[:1], curve.joules[:1]) for arc, curve in problem.hops.items()}
+    return replace(problem, hops=hops)
 
 
 def orders(activities: int) -> Iterator[tuple[int, ...]]:
@@ -96,7 +133,7 @@ def _least_of_order(
 def least_on_grid(problem: SteadyProblem, period: float, points: int, step: float) -> float:
     """Least joules of a cycle of one unit: every order, every activity and hop at `points`
     durations, one wait at every `step` s, whichever it is; the other waits as short as the
-    machines allow, each in its cheapest mode. Two machines at most.
+    machines allow, each in its cheapest mode.
     """
     best = np.inf
     for order in orders(len(problem.activities)):
@@ -104,10 +141,7 @@ def least_on_grid(problem: SteadyProblem, period: float, points: int, step: floa
         curves = []
         for k, a in enumerate(order):
             curves += [problem.activities[a], problem.hops.get((a, order[(k + 1) % n]))]
-        grids = [
-            np.array([0.0]) if c is None else np.linspace(c.seconds[0], c.seconds[-1], points)
-            for c in curves
-        ]
+        grids = [np.array([0.0]) if c is None else _between(c, points) for c in curves]
         rest = np.arange(0.0, max(problem.process) + step, step)
         *lengths, more = np.meshgrid(*grids, rest, indexing="ij")
         joules = sum(
@@ -124,6 +158,12 @@ def least_on_grid(problem: SteadyProblem, period: float, points: int, step: floa
             late = moving + sum(waits) > period + 1e-9
             best = min(best, float(np.where(late, np.inf, joules + standing).min()))
     return best
+
+
+def _between(curve: Curve, points: int) -> np.ndarray:
+    """Durations of a curve; one where it has no other."""
+    count = points if len(curve.seconds) > 1 else 1
+    return np.linspace(curve.seconds[0], curve.seconds[-1], count)
 
 
 def _waits(
