@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from ir_cli.errors import DemonstrationError
+from ir_cli.errors import DemonstrationError, ProcessError
 from ir_cli.output import Progress
-from ir_cli.ros.demo import LONGEST_PAUSE, Demonstration
+from ir_cli.ros.demo import LONGEST_PAUSE, Demonstration, finish_recording
 from ir_description import load_cell
-from ir_values.errors import RequestRefusedError
+from ir_values.errors import CallTimedOutError, RequestRefusedError
 
 STORY = {
     "_plan": RequestRefusedError("no path", -1),
@@ -58,3 +59,36 @@ def test_a_demonstration_that_ends_early_says_why_and_is_reported(
     assert reached[-1] == stage
     monkeypatch.setattr(demonstration, stage, lambda *_: plan)
     assert demonstration._story(None) == ""
+
+
+class SlowRecorder:
+    """A client whose recorder answers after some looks, or never."""
+
+    def __init__(self, seconds: float) -> None:
+        self.seconds = seconds
+        self.asked: list[str] = []
+
+    def ask(self, service: str, request: object, timeout: float) -> None:
+        self.asked.append(service)
+        assert timeout > 600.0
+        time.sleep(self.seconds)
+        if self.seconds > 1.0:
+            raise CallTimedOutError("closed")
+
+
+def test_a_recording_is_finished_however_long_it_takes_while_the_nodes_live() -> None:
+    alive: list[None] = []
+    recorder = SlowRecorder(0.5)
+    finish_recording(recorder, SimpleNamespace(check=lambda: alive.append(None)))
+    assert recorder.asked == ["/ir_recorder/stop"]
+    assert len(alive) >= 2
+
+
+def test_a_recorder_that_has_died_is_named_at_once() -> None:
+    def dead() -> None:
+        raise ProcessError("ir_recorder was killed")
+
+    begun = time.monotonic()
+    with pytest.raises(ProcessError, match="ir_recorder was killed"):
+        finish_recording(SlowRecorder(30.0), SimpleNamespace(check=dead))
+    assert time.monotonic() - begun < 10.0

@@ -11,8 +11,10 @@ of the recording held.
 from __future__ import annotations
 
 import math
+import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Future, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -218,6 +220,8 @@ LONGEST_TRANSITION = 600.0
 """Longest wait for a mode [s] where transitions take as long as the controller's."""
 LOOK_SECONDS = 0.1
 """Between two looks whether the nodes are there."""
+FINISH_SECONDS = 3600.0
+"""Longest wait for a recorder that lives to close its file [s]: an answer that is lost ends it."""
 START_SECONDS = 60.0
 """Longest wait for a node to offer its services: four processes that start at once on a slow
 machine.
@@ -325,7 +329,7 @@ class Demonstration:
                 self._start_recording(client, recording)
                 progress.end(str(recording))
                 failed = self._story(client)
-                client.ask("/" + names.STOP_RECORDING, StopRecording.Request())
+                finish_recording(client, nodes)
             nodes.end()
         progress.begin("read the recording, write report and picture")
         loads = 0 if failed else len(self._loads)
@@ -446,6 +450,25 @@ def await_services(client: Client, nodes: NodeProcesses, services: Sequence[str]
         if time.monotonic() > deadline:
             raise DemonstrationError(f"no {', '.join(sorted(missing))} after {START_SECONDS:g} s")
         time.sleep(LOOK_SECONDS)
+
+
+def finish_recording(client: Client, nodes: NodeProcesses) -> None:
+    """Let the recorder close its file, however long a loaded machine takes for it; a node that ends
+    meanwhile is named at once.
+    """
+    answer: Future[object] = Future()
+
+    def ask() -> None:
+        try:
+            request = StopRecording.Request()
+            answer.set_result(client.ask("/" + names.STOP_RECORDING, request, FINISH_SECONDS))
+        except IrError as error:
+            answer.set_exception(error)
+
+    threading.Thread(target=ask, daemon=True).start()
+    while not wait([answer], LOOK_SECONDS).done:
+        nodes.check()
+    answer.result()
 
 
 @contextmanager

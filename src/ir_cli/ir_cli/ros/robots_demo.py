@@ -23,11 +23,12 @@ from ir_cli.ros.demo import (
     Tended,
     await_services,
     check_sentence,
+    finish_recording,
     naming_the_dead,
 )
 from ir_cli.ros.processes import NodeCommand, NodeProcesses
 from ir_description import RobotCells, is_path
-from ir_msgs.srv import StartRecording, StopRecording
+from ir_msgs.srv import StartRecording
 from ir_msgs_py import names
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
@@ -141,7 +142,7 @@ class RobotsDemonstration:
                 client.ask("/" + names.START_RECORDING, request)
                 progress.end(str(recording))
                 failed = self._drive(programs, stack)
-                client.ask("/" + names.STOP_RECORDING, StopRecording.Request())
+                finish_recording(client, nodes)
             nodes.end()
         progress.begin("read the recording, write a page of each robot and one of all")
         outcome = examine_robots(recording, self._cells.robots, self._out, failed)
