@@ -4,6 +4,9 @@ afterwards.
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -122,6 +125,46 @@ def test_pressing_it_at_rest_lets_the_arm_sag_until_the_brakes_hold_it(make, loa
     assert np.linalg.norm(sag) == pytest.approx(simulation.safety.emergency.excursion, rel=1e-6)
     assert not simulation.backend.qd.any()
     assert not simulation.outputs().alarm_stop
+
+
+STOPS = re.findall(
+    r"^\| (none|155 kg) \| A(\d), ([\d.]+) rad in ([\d.]+) s \| (.+?) \| (.+?) \|$",
+    (Path(__file__).parents[2] / "docs" / "driver.md").read_text(),
+    re.MULTILINE,
+)
+
+
+def stopped_by(bit, simulation, joint):
+    """Angle [rad] and time [s] of a joint until it stands."""
+    q = simulation.backend.q[joint]
+    begun = simulation.time
+    simulation.plc.set_bit(bit, True)
+    while np.abs(simulation.backend.qd[joint]) > 1e-3:
+        simulation.step()
+    return abs(simulation.backend.q[joint] - q), simulation.time - begun
+
+
+@pytest.mark.parametrize(("load", "axis", "angle", "seconds", "stop_0", "stop_1"), STOPS)
+def test_the_table_of_stops_in_the_docs(
+    make, plan, start, home, load, axis, angle, seconds, stop_0, stop_1
+):
+    found = []
+    for bit in ("emergency_stop", "drives_off"):
+        simulation = make("pybullet", load="none" if load == "none" else "cell")
+        there = home.copy()
+        there[int(axis) - 1] += float(angle)
+        start(simulation, plan(float(seconds), home, there))
+        simulation.run(0.5 * float(seconds))
+        found.append(stopped_by(bit, simulation, int(axis) - 1))
+        simulation.run(0.5)
+        found.append(simulation.safety.emergency.excursion * 1e3)
+    (rad, lasted), off, (along, longer), _ = found
+    assert stop_0 == f"{rad:.2f} rad, {lasted:.2f} s, {off:.0f} mm"
+    assert stop_1 == f"{along:.2f} rad, {longer:.2f} s"
+
+
+def test_the_table_of_stops_has_its_rows():
+    assert len(STOPS) == 4
 
 
 def test_closed_brakes_don_t_sag(make):
