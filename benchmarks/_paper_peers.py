@@ -25,7 +25,7 @@ from ir_planner.request import Work
 from ir_planner.scene import PlanningScene, path_cost
 from ir_planner.search import SEARCHES, Ends, fewest_corners, pulled
 from ir_planner.search.with_ompl import worker
-from ir_planner.search.with_ompl.host import Parameters, Problem
+from ir_planner.search.with_ompl.host import OmplParameters, OmplProblem
 from ir_planner.search.with_ompl.planners import OmplSearch
 from ir_values.arrays import FloatArray
 
@@ -72,7 +72,7 @@ def searched(
     search = SEARCHES[name]
     if isinstance(search, OmplSearch):
         cells = search.cells() if cell is None else cell
-        parameters = Parameters(search.planner, search.parameters(), cells)
+        parameters = OmplParameters(search.planner, search.parameters(), cells)
         return _forked(question, parameters, seed, edges)
     # the models are there before the clock starts
     space = question.space(edges)
@@ -93,10 +93,10 @@ def _cost(path: FloatArray | None, question: Question) -> float:
     return path_cost(weights, pulled(fewest_corners(path, space, weights), space, weights))
 
 
-def _forked(question: Question, parameters: Parameters, seed: int, edges: int) -> Found:
+def _forked(question: Question, parameters: OmplParameters, seed: int, edges: int) -> Found:
     threshold = question.space(1).threshold
     goals = question.goal[None]
-    problem = Problem(
+    problem = OmplProblem(
         question.scene, threshold, question.start, goals, parameters, seed, edges, LATE_S
     )
     question.scene.collision.is_free(goals, threshold)  # the models are there before the fork
@@ -117,7 +117,7 @@ def _forked(question: Question, parameters: Parameters, seed: int, edges: int) -
     return Found(path is not None, spent, seconds, _cost(path, question))
 
 
-def _solve(problem: Problem, connection: Connection) -> None:
+def _solve(problem: OmplProblem, connection: Connection) -> None:
     util.setLogLevel(util.LogLevel.LOG_NONE)
     clock = Clock()
     for check in ("state", "motion"):

@@ -17,7 +17,7 @@ from _tracked_run import TrackedRun
 from _truth_section import Asked, Found
 
 from ir_description import load_power_data, load_power_parameters
-from ir_planner.checks import Interval, interval, movement_spread
+from ir_planner.checks import JouleInterval, interval, movement_spread
 from ir_planner.scene import scene_with
 from ir_sim_driver.plant import typical_plant
 
@@ -50,13 +50,13 @@ def measured(asked: Asked) -> Found:
     return Found(rows, [at_least(name, within, "", LEAST), at_most(name, within, "", MOST)])
 
 
-def _interval(each: Predicted) -> Interval:
+def _interval(each: Predicted) -> JouleInterval:
     movement = each.movement
     scene = scene_with(movement.cell, movement.load, load_power_data())
     return interval(each.energy, movement_spread(movement.trajectory, scene))
 
 
-def _held(every: list[Predicted], bounds: list[Interval], seed: int) -> dict[str, Any]:
+def _held(every: list[Predicted], bounds: list[JouleInterval], seed: int) -> dict[str, Any]:
     plants: dict[str, TrackedRun] = {}
     low = np.array([b.low for b in bounds])
     high = np.array([b.high for b in bounds])

@@ -15,8 +15,8 @@ from ir_msgs_py.savings import BeforeAfter
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner, RequestError
 from ir_planner.before_after import (
-    Stretch,
     Today,
+    TodayMotion,
     before_after,
     before_after_common,
     today_of_krl,
@@ -119,7 +119,7 @@ def test_the_planners_own_program_as_todays_saves_next_to_nothing(planner: Plann
     """Law: what is optimal already can't be improved by much."""
     plan = planner.plan_program(stations=("p1", "home"), start=planner.cell.machine_home)
     moves = [step.trajectory for step in plan.movements if step.trajectory is not None]
-    stretches = tuple(Stretch(one, one.positions[-1], one.duration) for one in moves)
+    stretches = tuple(TodayMotion(one, one.positions[-1], one.duration) for one in moves)
     found = before_after(planner, Today("own", "trace", planner.cell.machine_home, stretches))
     assert found.today.report.energy == pytest.approx(plan.report.energy, rel=1e-6)
     assert abs(found.planned.saving.share) < 0.01
@@ -133,7 +133,7 @@ def test_a_motion_that_is_faster_than_the_limits_is_compared_with_the_free_progr
     found = planner.plan_regional(start=home, goal="p1", objective="time").trajectory
     assert found is not None
     fast = JointTrajectory.from_seconds(found.joint_names, 0.9 * found.times, found.positions)
-    stretch = Stretch(fast, fast.positions[-1], fast.duration, label="0.00 s")
+    stretch = TodayMotion(fast, fast.positions[-1], fast.duration, label="0.00 s")
     compared = before_after(planner, Today("fast.csv", "trace", home, (stretch,), ()))
     same, free = compared.sides
     assert not same.found
@@ -144,7 +144,7 @@ def test_a_motion_that_is_faster_than_the_limits_is_compared_with_the_free_progr
 
 def test_a_program_that_goes_nowhere_is_a_sentence(planner: Planner) -> None:
     home = planner.cell.machine_home
-    nothing = Today("still", "trace", home, (Stretch(None, home, 5.0),))
+    nothing = Today("still", "trace", home, (TodayMotion(None, home, 5.0),))
     with pytest.raises(RequestError, match="still has no movement"):
         before_after(planner, nothing)
 
@@ -176,7 +176,7 @@ def test_a_cells_program_that_begins_in_a_posture_is_todays_that_starts_there(
     scene = planner.scene("")
     ends = [one.positions[-1] for one in moves]
     stretches = tuple(
-        Stretch(one, end, one.duration, works=bool(station_at(scene, end)))
+        TodayMotion(one, end, one.duration, works=bool(station_at(scene, end)))
         for one, end in zip(moves, ends, strict=True)
     )
     today = Today("own", "trace", planner.cell.machine_home, stretches)

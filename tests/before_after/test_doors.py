@@ -9,10 +9,10 @@ from ir_cli.trace_programs import RecordedDoors
 from ir_description import ProgramStep, Signal, load_cell
 from ir_msgs_py.names import NO_LOAD
 from ir_planner import Planner, PlanOptions, parse_goal
-from ir_planner.before_after import Stretch, Today
+from ir_planner.before_after import Today, TodayMotion
 from ir_planner.before_after.today_steps import (
-    Asked,
     AskedProgram,
+    StepToday,
     asked_program,
     assumed_doors,
     costed_steps,
@@ -41,7 +41,9 @@ def today(*doors: Doors | None) -> tuple[Today, AskedProgram]:
     assert plan.trajectory is not None
     into = plan.trajectory
     end = np.asarray(plan.trajectory.positions[-1])
-    stretches = tuple(Stretch(into, end, into.duration, works=True, doors=each) for each in doors)
+    stretches = tuple(
+        TodayMotion(into, end, into.duration, works=True, doors=each) for each in doors
+    )
     known = Today("t", "trace", np.asarray(CELL.machine_home), stretches)
     return known, asked_program(known, planner.scene(NO_LOAD))
 
@@ -76,9 +78,9 @@ def test_programs_begin_with_the_doors_that_were_recorded(
     doors: tuple[Doors | None, ...], signals: tuple[Signal, ...], begin: Doors, sentence: str
 ) -> None:
     q = np.asarray(CELL.machine_home)
-    known = Today("t", "trace", q, tuple(Stretch(None, q, 1.0, doors=each) for each in doors))
+    known = Today("t", "trace", q, tuple(TodayMotion(None, q, 1.0, doors=each) for each in doors))
     step = ProgramStep("POSTURE", "home", set_signals=signals)
-    asked = AskedProgram(CELL, (Asked(step, known.stretches),), ())
+    asked = AskedProgram(CELL, (StepToday(step, known.stretches),), ())
     found, notes = doors_at_the_start(known, asked, CELL)
     assert found == begin
     assert any(sentence in note for note in notes)

@@ -10,7 +10,7 @@ from contextlib import suppress
 from typing import Any
 
 from ir_msgs_py.modes import OFF_THE_NETWORK, Mode, TransitionTimes
-from ir_sim_driver.controller.goals import GoalQueue
+from ir_sim_driver.controller.goals import TrajectoryQueue
 from ir_sim_driver.controller.mode_control import ModeControl
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.errors import RequestRefusedError, TrajectoryRefusedError
@@ -37,7 +37,7 @@ class Core:
     def __init__(self) -> None:
         self.plc = Plc(SETTINGS.plc, Silent())  # type: ignore[arg-type]
         self.control = ModeControl(SETTINGS, self.plc, lambda mode: 100.0, {})
-        self.queue = GoalQueue()
+        self.queue = TrajectoryQueue()
         self.moving: int | None = None
         self.recovered = 0  # times
 

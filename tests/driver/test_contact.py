@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from ir_description import AllowedContact, ProgramStep, Zone, load_cell, machine_in
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver import make_simulation
-from ir_sim_driver.controller.cell_scene import Machines, Parts
+from ir_sim_driver.controller.cell_scene import MachinesInScene, Parts
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.goal import ErrorCode, TrajectoryGoal
 from ir_sim_driver.plant import carried
@@ -204,7 +204,7 @@ signals = st.lists(st.tuples(st.booleans(), st.floats(0.0, 3.0)), max_size=12)
 @given(signals)
 @settings(max_examples=50, deadline=None)
 def test_a_machine_ends_in_the_state_of_its_last_signal_in_its_own_time(heard):
-    machines = Machines(DEMO)
+    machines = MachinesInScene(DEMO)
     now = 0.0
     switch = DEMO.machine("lathe").switch
     for level, pause in heard:

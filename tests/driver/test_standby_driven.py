@@ -15,7 +15,7 @@ import pytest
 from ir_description import load_cell, load_power_data
 from ir_msgs_py.modes import Mode, TransitionTimes
 from ir_msgs_py.names import NO_LOAD
-from ir_planner.program.pauses import Step, rests_at
+from ir_planner.program.pauses import RestStep, rests_at
 from ir_planner.program.standby import advice, lengths_of, plan_standby
 from ir_planner.scene import scene_with
 from ir_sim_driver.controller.settings import SimulationSettings
@@ -110,7 +110,7 @@ def test_a_policy_costs_what_was_planned_whenever_the_pause_ends(seed: int) -> N
     planned = advice(lengths_of(0.0, samples), case.q, case.scene, case.times)
     rests = rests_at(case.q, case.scene, case.times)
     steps = tuple(
-        Step(rests.named(mode), at)
+        RestStep(rests.named(mode), at)
         for mode, at in zip(planned.modes, planned.switch_times, strict=True)
         if mode in BITS
     )
@@ -121,7 +121,7 @@ def test_a_policy_costs_what_was_planned_whenever_the_pause_ends(seed: int) -> N
     close(measured, energy)
 
 
-def followed(case: Case, steps: tuple[Step, ...], pause: float) -> tuple[float, float]:
+def followed(case: Case, steps: tuple[RestStep, ...], pause: float) -> tuple[float, float]:
     """Energy [J] and delay [s] of the plant when a PLC sets its bits at the switch times and at the
     end.
     """

@@ -19,7 +19,7 @@ from ir_msgs.srv import SetLoad, SetPlcInput, StartPause
 from ir_msgs_py.ros.node_process import FAILURES_MAX, Spinning, spin
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver import Driver, make_simulation
-from ir_sim_driver.node.services import Services
+from ir_sim_driver.node.services import DriverServices
 from ir_sim_driver.notices import Level, Notice, Notices, shortened
 
 NO_DESCRIPTORS = OSError(errno.EMFILE, "Too many open files")
@@ -33,8 +33,8 @@ def driver() -> Any:
     made.close()
 
 
-def services(driver: Any) -> Services:
-    return Services(driver, "ir_sim_driver", lambda: None)
+def services(driver: Any) -> DriverServices:
+    return DriverServices(driver, "ir_sim_driver", lambda: None)
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ from ir_planner.program.cycle_plan import Task, shared_out
 from ir_planner.program.program import plan_program
 from ir_planner.program.request import ProgramPlan, ProgramRequest
 from ir_planner.program.standby import plan_standby
-from ir_planner.program.station_graph import Part
+from ir_planner.program.station_graph import HopPart
 from ir_planner.program.time_values import FASTEST, LADDER, Ladder, Point, TimeValues, convex_front
 from ir_planner.request.context import Work
 from ir_planner.scene.planning_scene import load_text, scene_with
@@ -58,11 +58,11 @@ class Values:
 
     def __init__(self, fronts: list[list[tuple[float, float]]]) -> None:
         self.points = {
-            Part(k, "across", 0, 0): [Point.of(invented(*point)) for point in front]
+            HopPart(k, "across", 0, 0): [Point.of(invented(*point)) for point in front]
             for k, front in enumerate(fronts)
         }
 
-    def fronts(self) -> dict[Part, list[Point]]:
+    def fronts(self) -> dict[HopPart, list[Point]]:
         """Convex ones."""
         return {part: convex_front(points) for part, points in self.points.items()}
 
@@ -128,7 +128,7 @@ def test_too_short_a_time_has_no_answer() -> None:
     assert shared_out(cast(TimeValues, values), Task(2.9, lambda left: 0.0, values.slower)) is None
 
 
-ACROSS_PART = Part(0, "across", 0, 0)
+ACROSS_PART = HopPart(0, "across", 0, 0)
 
 
 class Rung:
@@ -138,10 +138,10 @@ class Rung:
         self.found = invented(seconds, joules)
         self.context = SimpleNamespace(work=SimpleNamespace(exhausted=False))
 
-    def plan(self, parts: list[Part], improvement: int) -> list[Movement]:
+    def plan(self, parts: list[HopPart], improvement: int) -> list[Movement]:
         return [self.found for _ in parts]
 
-    def movement(self, part: Part) -> Movement:
+    def movement(self, part: HopPart) -> Movement:
         return self.found
 
 
@@ -166,7 +166,7 @@ class Rungs:
     def rates(self, rung: int) -> Rates:
         return Rates(0.0, 1.0) if rung == FASTEST else Rates(1.0, 500.0 * LADDER[rung])
 
-    def from_others(self, rung: int, known: dict[Part, Movement]) -> dict[Part, Movement]:
+    def from_others(self, rung: int, known: dict[HopPart, Movement]) -> dict[HopPart, Movement]:
         self.asked[rung] = known[ACROSS_PART]
         return {ACROSS_PART: self.better}
 

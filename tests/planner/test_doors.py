@@ -17,11 +17,11 @@ from ir_msgs_py.modes import TransitionTimes
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner import Planner
-from ir_planner.current_cell import Heard
+from ir_planner.current_cell import DriverReports
 from ir_planner.program import ProgramPlan, ProgramRequest, plan_program
 from ir_planner.program.steps import doors_along
 from ir_planner.request import Work, parse_goal
-from ir_sim_driver.controller.cell_scene import Machines
+from ir_sim_driver.controller.cell_scene import MachinesInScene
 
 DEMO = load_cell("demo")
 OPEN = "lathe_open_door"
@@ -49,10 +49,10 @@ def test_the_driver_s_machine_is_in_the_planned_states_however_long_movements_ta
 ):
     state, written = ("door_closed" if each else "door_open" for each in (shut, shut_in_the_file))
     cell, file = (DEMO.with_equipment("lathe", state=each) for each in (state, written))
-    heard = Heard(TransitionTimes)
-    heard.machines = Machines(cell).states(0.0)
+    heard = DriverReports(TransitionTimes)
+    heard.machines = MachinesInScene(cell).states(0.0)
     along = doors_along(file, program, heard.doors(file))
-    machines = Machines(cell)
+    machines = MachinesInScene(cell)
     lathe = cell.machine("lathe")
     now = 0.0
     delay = next(signal.delay for signal in cell.signals if signal.name == IS_OPEN)

@@ -14,9 +14,9 @@ from ir_planner.cycle import (
     ArmWork,
     Curve,
     JointCycle,
-    Stretch,
     WaitMode,
     Zone,
+    ZoneStretch,
     cheapest_joint,
     shortest_joint,
     zones_of,
@@ -51,7 +51,9 @@ def drawn(seed: int, robots: int = 2) -> tuple[list[ArmWork], list[Zone]]:
     zones = []
     for k in range(robots - 1):
         for side in range(int(rng.integers(1, 3))):
-            stretches = [Stretch(robot, 2 * side, int(rng.integers(1, 3))) for robot in (k, k + 1)]
+            stretches = [
+                ZoneStretch(robot, 2 * side, int(rng.integers(1, 3))) for robot in (k, k + 1)
+            ]
             zones.append(Zone(stretches[0], stretches[1]))
     return works, zones
 
@@ -62,7 +64,7 @@ def cheapest(works: list[ArmWork], zones: list[Zone], period: float) -> JointCyc
     return found
 
 
-def stretch_times(cycle: JointCycle, stretch: Stretch) -> tuple[float, float]:
+def stretch_times(cycle: JointCycle, stretch: ZoneStretch) -> tuple[float, float]:
     arm = cycle.arms[stretch.robot]
     last = stretch.first + stretch.count - 1
     return arm.begin[stretch.first], arm.begin[last] + arm.seconds[last]
@@ -174,7 +176,7 @@ def test_every_meeting_is_in_one_zone_and_zones_leave_something_between(seed: in
             cells |= {((a + step) % around, b): () for step in (1, 2)}
     zones = zones_of((4, 7), counts, cells)
 
-    def within(stretch: Stretch, activity: int, count: int) -> bool:
+    def within(stretch: ZoneStretch, activity: int, count: int) -> bool:
         return (activity - 2 * stretch.first - 1) % (2 * count) < 2 * stretch.count - 1
 
     for a, b in cells:

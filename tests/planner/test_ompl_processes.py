@@ -26,7 +26,7 @@ from ir_planner.request import Work
 from ir_planner.scene import PlanningScene
 from ir_planner.search import SEARCHES, Ends, Found, with_ompl
 from ir_planner.search.with_ompl import host, worker
-from ir_planner.search.with_ompl.host import STOP, Parameters, Problem
+from ir_planner.search.with_ompl.host import STOP, OmplParameters, OmplProblem
 
 SceneOf = Callable[[str], PlanningScene]
 S_M = 0.02
@@ -225,9 +225,9 @@ def test_a_search_that_is_stopped_answers_what_it_has_found(
 
     monkeypatch.setattr(worker._Counted, "_affordable", stopping)
     ends, space = a_task(scene_of("table_columns"), free_work())
-    parameters = Parameters("AORRTC", SEARCHES["aorrtc"].parameters())
+    parameters = OmplParameters("AORRTC", SEARCHES["aorrtc"].parameters())
     goals = ends.goals
-    problem = Problem(
+    problem = OmplProblem(
         space.scene, space.threshold, ends.start, goals, parameters, 1, 1_000_000, 60.0
     )
     outcome = worker.solved(problem, theirs)
@@ -271,7 +271,7 @@ from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.search import SEARCHES, Ends, with_ompl
 from ir_planner.search.with_ompl import host, worker
-from ir_planner.search.with_ompl.host import STOP, Parameters, Problem
+from ir_planner.search.with_ompl.host import STOP, OmplParameters, OmplProblem
 
 @contextmanager
 def charge(process):

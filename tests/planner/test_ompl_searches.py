@@ -26,7 +26,7 @@ from ir_planner.scene import PlanningScene
 from ir_planner.search import SEARCHES, Ends, with_ompl
 from ir_planner.search.with_ompl import host
 from ir_planner.search.with_ompl import planners as adapter
-from ir_planner.search.with_ompl.host import OmplAnswer, Parameters, Problem
+from ir_planner.search.with_ompl.host import OmplAnswer, OmplParameters, OmplProblem
 from ir_planner.search.with_ompl.planners import repaired
 
 SceneOf = Callable[[str], PlanningScene]
@@ -90,9 +90,9 @@ def test_a_roadmap_to_several_goals_is_checked_in_one_thread(scene_of: SceneOf) 
     """
     ends, space = a_blocked_task(scene_of, Work(1000, 1.0, lambda: 0.0))
     goals = np.concatenate([ends.goals, ends.goals - 0.05, ends.goals + 0.05])
-    parameters = Parameters("PRM", reverse=with_ompl.Prm.reverse)
+    parameters = OmplParameters("PRM", reverse=with_ompl.Prm.reverse)
     scene = replace(space.scene)  # without what it has computed
-    problem = Problem(scene, space.threshold, ends.start, goals, parameters, 1, 2000, 9.0)
+    problem = OmplProblem(scene, space.threshold, ends.start, goals, parameters, 1, 2000, 9.0)
     command = [sys.executable, "-c", CHECKED_BY]
     ran = subprocess.run(
         command, input=pickle.dumps(problem), capture_output=True, check=False, timeout=300.0
@@ -151,8 +151,8 @@ def test_a_request_that_is_cancelled_meanwhile_raises(scene_of: SceneOf) -> None
 def test_a_process_that_dies_is_an_answer_without_a_path(
     scene_of: SceneOf, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def no_planner(problem: Problem, work: Work) -> OmplAnswer:
-        return asked(Problem(**{**vars(problem), "parameters": "no parameters"}), work)
+    def no_planner(problem: OmplProblem, work: Work) -> OmplAnswer:
+        return asked(OmplProblem(**{**vars(problem), "parameters": "no parameters"}), work)
 
     asked = adapter.asked
     monkeypatch.setattr(adapter, "asked", no_planner)

@@ -20,7 +20,7 @@ from ir_planner.errors import RequestError
 from ir_planner.program.chain import layers_of
 from ir_planner.program.movements import Movements, cost_of, rates_of
 from ir_planner.program.program import ProgramPlan, ProgramRequest, prepared
-from ir_planner.program.station_graph import ACROSS, ENTER, Part
+from ir_planner.program.station_graph import ACROSS, ENTER, HopPart
 from ir_planner.request import Journal, Work
 from ir_planner.service import exit_searches
 from ir_planner.settings import PlannerSettings
@@ -147,7 +147,7 @@ def test_no_other_configuration_along_the_path_costs_less(
     rates = rates_of(context)
     costs = []
     for k in range(len(layers[2])):
-        parts = [Part(1, ACROSS, 0, k), Part(1, ENTER, -1, k), Part(2, ACROSS, k, 0)]
+        parts = [HopPart(1, ACROSS, 0, k), HopPart(1, ENTER, -1, k), HopPart(2, ACROSS, k, 0)]
         found = movements.plan(parts, 2_500)
         costs.append(
             sum(cost_of(one.report, rates) if hasattr(one, "report") else np.inf for one in found)

@@ -19,7 +19,7 @@ from ir_planner.program.movements import Movements
 from ir_planner.program.program import plan_program, prepared
 from ir_planner.program.request import ProgramPlan, ProgramRequest, nobody
 from ir_planner.program.savings import CommonProgram, common_program, nearest_chain, savings_of
-from ir_planner.program.station_graph import Chain
+from ir_planner.program.station_graph import StationChain
 from ir_planner.program.time_values import Ladder
 from ir_planner.request import Journal, Work
 from ir_planner.search.registry import registered
@@ -47,7 +47,7 @@ def movements(request_: ProgramRequest) -> Movements:
 @pytest.fixture(scope="module")
 def common(request_: ProgramRequest, movements: Movements) -> CommonProgram:
     """It needs the layers alone: the chain of the request doesn't matter."""
-    nowhere = Chain([], 0.0, 0.0, 0.0)
+    nowhere = StationChain([], 0.0, 0.0, 0.0)
     return common_program(Choice(request_, Ladder(movements, 0), nowhere))
 
 

@@ -10,7 +10,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Hop, Part, Settled, StationGraph
+from ir_planner.program.station_graph import (
+    ACROSS,
+    ENTER,
+    LEAVE,
+    Hop,
+    HopPart,
+    Settled,
+    StationGraph,
+)
 
 
 @dataclass
@@ -23,7 +31,7 @@ class World:
     across: list[np.ndarray]
     enter: list[np.ndarray]
     share: float
-    asked: list[Part] = field(default_factory=list)
+    asked: list[HopPart] = field(default_factory=list)
 
     def hops(self) -> list[Hop]:
         """Bounds; what is impossible looks cheap at first."""
@@ -34,14 +42,14 @@ class World:
         ]
         return [Hop(*hop) for hop in bounds]
 
-    def cost(self, part: Part) -> float:
+    def cost(self, part: HopPart) -> float:
         if part.kind == LEAVE:
             return float(self.leave[part.hop][part.first])
         if part.kind == ENTER:
             return float(self.enter[part.hop][part.second])
         return float(self.across[part.hop][part.first, part.second])
 
-    def settle(self, parts: list[Part]) -> list[Settled]:
+    def settle(self, parts: list[HopPart]) -> list[Settled]:
         """Half of the parts get a better bound first, then all their cost."""
         found = []
         for part in parts:
@@ -120,7 +128,7 @@ def test_a_stated_gap_is_true_where_the_work_ends_first(world: World, most: int)
 def test_a_bound_that_is_only_measured_is_not_in_the_proved_one(world: World, most: int) -> None:
     """Measured bounds that are wrong by a fifth spoil the bound, but not the proved one."""
 
-    def settle(parts: list[Part]) -> list[Settled]:
+    def settle(parts: list[HopPart]) -> list[Settled]:
         return [
             s if s.exact else Settled(1.2 * s.cost, False, proved=False)
             for s in world.settle(parts)
@@ -174,9 +182,11 @@ def test_a_search_that_must_end_knows_a_chain_or_none(world: World, most: int) -
         assert all(world.cost(part) < np.inf for part in parts_of(chain.chosen))
 
 
-def parts_of(chosen: list[int]) -> list[Part]:
+def parts_of(chosen: list[int]) -> list[HopPart]:
     """All parts of a chain."""
     kinds = (LEAVE, ACROSS, ENTER)
     return [
-        Part(k, kind, a, b) for k, (a, b) in enumerate(itertools.pairwise(chosen)) for kind in kinds
+        HopPart(k, kind, a, b)
+        for k, (a, b) in enumerate(itertools.pairwise(chosen))
+        for kind in kinds
     ]

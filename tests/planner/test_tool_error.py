@@ -11,7 +11,13 @@ from scipy.spatial.transform import Rotation
 
 from ir_msgs_py.cartesian import CartesianPath, CartesianSegment
 from ir_planner import Planner
-from ir_planner.cartesian.path_parts import Evenly, Rates, ThroughPoses, about_tool, rates_of
+from ir_planner.cartesian.path_parts import (
+    Evenly,
+    RotationRates,
+    ThroughPoses,
+    about_tool,
+    rates_of,
+)
 from ir_planner.checks import tool_derivatives
 
 ROOT = np.sqrt(2.0)
@@ -19,7 +25,7 @@ STEP = 1e-4
 
 
 def differences(rotations: np.ndarray) -> tuple[float, float]:
-    """Largest |R'| and |R''| of rotations (M, 3, 3) at `STEP`, as Rates are meant."""
+    """Largest |R'| and |R''| of rotations (M, 3, 3) at `STEP`, as RotationRates are meant."""
     first = np.diff(rotations, axis=0) / STEP
     second = np.diff(first, axis=0) / STEP
     return tuple(float(np.linalg.norm(one, axis=(1, 2)).max()) / ROOT for one in (first, second))
@@ -38,7 +44,7 @@ def test_rotations_turn_no_faster_than_their_rates(seed: int) -> None:
     s = np.arange(0.0, at[-1], STEP)
     spline = make_interp_spline(at, rng.normal(size=5), k=3)
     even = Evenly.between(poses[0], poses[1], at[-1])
-    turning: dict[str, tuple[Rates, np.ndarray]] = {
+    turning: dict[str, tuple[RotationRates, np.ndarray]] = {
         "evenly": (even.rates, even.at(s)),
         "through poses": (ThroughPoses(at, poses).rates, ThroughPoses(at, poses).at(s)),
         "about the tool": (rates_of(spline), about_tool(spline(s))),

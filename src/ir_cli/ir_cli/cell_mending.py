@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from ir_cli.planning import CEILING
-from ir_cli.station_access import MARGIN, Line, Visit, lines_of, visits
+from ir_cli.station_access import MARGIN, AccessLine, Visit, lines_of, visits
 from ir_description import AllowedContact, Cell, Equipment, Station, cell_to_yaml
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Planner
@@ -47,7 +47,7 @@ class Exit:
     """
 
     approach: float
-    lines: tuple[Line, ...]
+    lines: tuple[AccessLine, ...]
 
     @property
     def free(self) -> bool:

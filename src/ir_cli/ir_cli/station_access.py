@@ -156,7 +156,7 @@ class Near:
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class AccessLine:
     """The line out of a station in one configuration q (n,); reach [m]: how far it can be followed.
 
     near: pairs too near with what the station allows, the nearest first. mendable: contacts and a
@@ -186,7 +186,7 @@ class Line:
         return "" if self.whole else f"the joint limits end it after {1e3 * self.reach:.0f} mm"
 
 
-def lines_of(visit: Visit, approach: float) -> list[Line]:
+def lines_of(visit: Visit, approach: float) -> list[AccessLine]:
     """The line of every configuration that reaches the station, with an approach distance [m]."""
     station = replace(visit.station, approach_distance=approach)
     scene = visit.scene
@@ -208,7 +208,7 @@ def _followed(q: FloatArray, nexts: Sequence[FloatArray]) -> FloatArray:
     return np.array(points)
 
 
-def _judged(points: FloatArray, count: int, station: Station, scene: PlanningScene) -> Line:
+def _judged(points: FloatArray, count: int, station: Station, scene: PlanningScene) -> AccessLine:
     """A line (L, n): contacts count where the tcp is in the zone, and never at the outer end."""
     distance = scene.collision.distances(points)
     tcp = scene.chain.tcp_poses(points)[:, :3, 3]
@@ -233,7 +233,7 @@ def _judged(points: FloatArray, count: int, station: Station, scene: PlanningSce
     contacts = tuple(_contact(int(z), float(least[z]), scene) for z in pairs if least[z] <= kept[z])
     within = tcp[(distance <= MARGIN).any(axis=1) & ~last]
     near = tuple(sorted(found, key=lambda each: each.distance))
-    return Line(points[0], float(out[-1]), whole, near, mendable, contacts, within)
+    return AccessLine(points[0], float(out[-1]), whole, near, mendable, contacts, within)
 
 
 def _by_hand(z: int, scene: PlanningScene) -> bool:
@@ -291,5 +291,5 @@ def _rows(visit: Visit) -> Iterator[Row]:
         }
 
 
-def _said(line: Line) -> str:
+def _said(line: AccessLine) -> str:
     return line.sentence or f"free, {1e3 * line.reach:.0f} mm"

@@ -13,7 +13,7 @@ from ir_cli.traces import motion_of
 from ir_description import Cell, Equipment
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner
-from ir_planner.before_after import Stretch, Today
+from ir_planner.before_after import Today, TodayMotion
 from ir_planner.program import Doors, Progress, nobody
 from ir_recorder import read_recording
 from ir_recorder.errors import RecorderError
@@ -103,12 +103,12 @@ def today_of_trace(
 
 def stretches_of(
     motion: JointTrajectory, doors: RecordedDoors | None = None
-) -> tuple[list[Stretch], float]:
+) -> tuple[list[TodayMotion], float]:
     """Movements and pauses from the first movement to the last, and the seconds [s] outside of
     them.
     """
     runs = _runs(motion)
-    found: list[Stretch] = []
+    found: list[TodayMotion] = []
 
     def stood(begin: float, end: float) -> Doors | None:
         return None if doors is None else doors.during(begin, end)
@@ -121,11 +121,13 @@ def stretches_of(
         label = f"{begin:.2f} s"
         at = stood(begin, last)
         found.append(
-            Stretch(part, np.asarray(part.positions[-1]), part.duration, label=label, doors=at)
+            TodayMotion(part, np.asarray(part.positions[-1]), part.duration, label=label, doors=at)
         )
         if stands:
             at = stood(end, behind)
-            found.append(Stretch(None, found[-1].q, behind - end, label=f"{end:.2f} s", doors=at))
+            found.append(
+                TodayMotion(None, found[-1].q, behind - end, label=f"{end:.2f} s", doors=at)
+            )
     covered = runs[-1][1] - runs[0][0] if runs else 0.0
     return found, float(motion.duration - motion.times[0] - covered)
 

@@ -23,7 +23,7 @@ from ir_planner.scene import Drives, PlanningScene, load_text, scene_with
 from ir_values.arrays import FloatArray
 
 
-class Heard:
+class DriverReports:
     """timers, load, machines: what the driver says, None while no driver does. settings: asked for
     the transition times where no driver says them.
     """
@@ -88,7 +88,7 @@ class CurrentCell:
 
     def __init__(
         self,
-        heard: Heard,
+        heard: DriverReports,
         drives: Callable[[RobotModel], Drives],
         power: PowerData | None = None,
         read: ReadCell = read_cell_here,

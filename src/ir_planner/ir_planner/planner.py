@@ -40,11 +40,11 @@ from ir_planner.configurations import (
     IkAnswer,
     configurations_at,
 )
-from ir_planner.current_cell import CurrentCell, Heard, ReadCell, read_cell_here
+from ir_planner.current_cell import CurrentCell, DriverReports, ReadCell, read_cell_here
 from ir_planner.errors import RequestError, UnknownNameError, unfit
 from ir_planner.flexible import SteadyPlan, plan_steady_cycle
 from ir_planner.program import (
-    Lengths,
+    PauseLengths,
     ProgramPlan,
     ProgramRequest,
     Progress,
@@ -178,7 +178,7 @@ class Planner:
     ) -> None:
         self.clock = clock
         self.settings = settings or PlannerSettings()
-        self.heard = Heard(lambda: self.settings.transitions)
+        self.heard = DriverReports(lambda: self.settings.transitions)
         self._current = CurrentCell(
             self.heard, lambda robot: self.settings.drives(robot), power, read_cell
         )
@@ -330,7 +330,7 @@ class Planner:
 
     def standby(
         self,
-        pause: float | Lengths,
+        pause: float | PauseLengths,
         *,
         q: FloatArray | None = None,
         load: str = "",

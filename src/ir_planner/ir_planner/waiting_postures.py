@@ -10,7 +10,7 @@ from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.errors import RequestError, UnknownNameError
-from ir_planner.program import Lengths, Standby, Trip, best_posture, lengths_of
+from ir_planner.program import PauseLengths, Standby, Trip, best_posture, lengths_of
 from ir_planner.regional import MovementPlan
 from ir_planner.request import POSTURES, Goal, parse_goal
 from ir_planner.scene import PlanningScene
@@ -21,7 +21,7 @@ Plan = Callable[[FloatArray, Goal], MovementPlan]
 
 
 def standby_at(
-    pause: float | Lengths,
+    pause: float | PauseLengths,
     q: FloatArray | None,
     postures: Sequence[str],
     scene: PlanningScene,
@@ -29,7 +29,7 @@ def standby_at(
     plan: Plan,
 ) -> Standby:
     """How to spend a pause [s] at q (n,), None: machine home, or at one of the postures."""
-    lengths = pause if isinstance(pause, Lengths) else lengths_of(pause)
+    lengths = pause if isinstance(pause, PauseLengths) else lengths_of(pause)
     here = scene.cell.machine_home if q is None else q
     return best_posture(
         lengths, here, trips_to(postures, here, scene.cell, plan), scene, transitions

@@ -60,7 +60,7 @@ MODES_AT_REST = 4
 
 
 @dataclass(frozen=True)
-class Outcome:
+class DemoOutcome:
     """The analysed recording and whether every check held."""
 
     analysis: Analysis
@@ -186,7 +186,9 @@ def check_sentence(check: Finding) -> str:
     )
 
 
-def examine(recording: Path, report: Path, picture: Path, loads: int, failed: str = "") -> Outcome:
+def examine(
+    recording: Path, report: Path, picture: Path, loads: int, failed: str = ""
+) -> DemoOutcome:
     """Analyse the recording, write report and picture; loads: how many the tour carried; failed:
     why the demonstration ended early.
     """
@@ -196,7 +198,7 @@ def examine(recording: Path, report: Path, picture: Path, loads: int, failed: st
     checks = findings(analysis, Tolerances(resting_rows=MODES_AT_REST * loads))
     write_report(analysis, checks, report)
     write_picture(analysis, picture)
-    return Outcome(analysis, checks)
+    return DemoOutcome(analysis, checks)
 
 
 # The run: nodes, plan, tour of the power modes, program.
@@ -300,7 +302,7 @@ class Demonstration:
         )
         return plan.run_cell, (approach, *plan.run.movements)
 
-    def run(self) -> Outcome:
+    def run(self) -> DemoOutcome:
         """Start the nodes, run the story, stop the nodes, examine the recording."""
         self._out.mkdir(parents=True, exist_ok=True)
         recording = self._out / "demo.mcap"

@@ -3,12 +3,12 @@ others.
 """
 
 from ir_planner.before_after.comparison import before_after, before_after_common
-from ir_planner.before_after.today import Stretch, Today, today_of_krl
+from ir_planner.before_after.today import Today, TodayMotion, today_of_krl
 from ir_planner.before_after.today_steps import assumed_doors
 
 __all__ = [
-    "Stretch",
     "Today",
+    "TodayMotion",
     "assumed_doors",
     "before_after",
     "before_after_common",

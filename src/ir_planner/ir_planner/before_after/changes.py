@@ -8,7 +8,7 @@ import numpy as np
 from ir_description import drawn_robots
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.savings import Change, Hop, Saving, Side
-from ir_planner.checks import Interval, interval, movement_energy, total_report
+from ir_planner.checks import JouleInterval, interval, movement_energy, total_report
 from ir_planner.program import ProgramRequest, Spreads
 from ir_planner.scene import PlanningScene, scene_with
 from ir_values.arrays import FloatArray
@@ -19,7 +19,7 @@ ROBOTS = 40  # drawn: each drives the movements, so that fewer than for energies
 _NEAR = 0.7  # of the peak: movements that take less don't come to it with other parameters
 
 
-def peak_interval(steps: Sequence[PlannedMovement], request: ProgramRequest) -> Interval:
+def peak_interval(steps: Sequence[PlannedMovement], request: ProgramRequest) -> JouleInterval:
     """The 90 % interval [W] of the largest power of some steps; it holds the nominal one."""
     peak = max((step.report.peak_power for step in steps), default=0.0)
     worst = np.zeros(ROBOTS)
@@ -40,7 +40,7 @@ def peak_interval(steps: Sequence[PlannedMovement], request: ProgramRequest) -> 
             worst, step.report.peak_power * np.array(drawn) / max(float(nominal), 1e-9)
         )
     if not worst.any():
-        return Interval(peak, peak)
+        return JouleInterval(peak, peak)
     return interval(peak, worst - peak)
 
 

@@ -13,9 +13,9 @@ from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.savings import BeforeAfter, Saving, Side
 from ir_msgs_py.status import StatusCode
 from ir_planner.before_after.changes import Costed, changes, costed, saving, side_of
-from ir_planner.before_after.today import Stretch, Today, nothing_moves
+from ir_planner.before_after.today import Today, TodayMotion, nothing_moves
 from ir_planner.before_after.today_steps import (
-    Asked,
+    StepToday,
     asked_program,
     assumed_doors,
     costed_steps,
@@ -59,8 +59,9 @@ def before_after(
     waiting = before
     if cycle_time > before.seconds + _NO_DIFFERENCE:
         left = cycle_time - before.seconds
-        wait = Asked(
-            ProgramStep("PAUSE", dwell=left, power_mode=AUTO), (Stretch(None, today.start, left),)
+        wait = StepToday(
+            ProgramStep("PAUSE", dwell=left, power_mode=AUTO),
+            (TodayMotion(None, today.start, left),),
         )
         waiting = asking.costed(costed_steps((*asked.steps, wait), asking.request))
     sides = [asking.planned(SAME, before.seconds, before), asking.planned(FREE, 0.0, before)]

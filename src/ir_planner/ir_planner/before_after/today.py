@@ -218,7 +218,7 @@ def _listed(names: Sequence[str] | dict[str, None]) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class TodayMotion:
     """One movement, or a standstill of `seconds` (trajectory None), that ends at q (n,) [rad].
 
     works: something is done where it ends (an output, a wait for a machine), so that the stop is
@@ -257,7 +257,7 @@ class Today:
     name: str
     kind: str
     start: FloatArray
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[TodayMotion, ...]
     notes: tuple[str, ...] = ()
     loads: tuple[Load, ...] = ()
 
@@ -335,13 +335,13 @@ def _same_load(a: Load, b: Load) -> bool:
     return names[0] == names[1] and np.array_equal(figures[0], figures[1])
 
 
-def _stretch(one: EvaluatedStep, process: CellPath | None) -> Stretch:
+def _stretch(one: EvaluatedStep, process: CellPath | None) -> TodayMotion:
     step = one.step
     end = np.asarray(step.trajectory.positions[-1])
     works = bool(step.outputs or step.waits_for)
     trajectory = step.trajectory if step.moves else None
     label = lines_of(step.places)
-    return Stretch(
+    return TodayMotion(
         trajectory,
         end,
         step.trajectory.duration,

@@ -6,7 +6,7 @@ import numpy as np
 
 from ir_description import Cell, CellPath, Equipment, ProgramStep, Signal, Station, Zone
 from ir_msgs_py.report import MovementKind, PlannedMovement
-from ir_planner.before_after.today import Stretch, Today, driven_as, nothing_moves, same_poses
+from ir_planner.before_after.today import Today, TodayMotion, driven_as, nothing_moves, same_poses
 from ir_planner.checks import evaluate_trajectory
 from ir_planner.krl import posture_at, station_at
 from ir_planner.program import (
@@ -34,11 +34,11 @@ _ZONE = 1e-3  # m: there is no machine
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class StepToday:
     """A step of the program, and what today's program does in it."""
 
     step: ProgramStep
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[TodayMotion, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class AskedProgram:
     """The cell with the stations that were added, its program, and what was noticed."""
 
     cell: Cell
-    steps: tuple[Asked, ...]
+    steps: tuple[StepToday, ...]
     notes: tuple[str, ...]
 
 
@@ -54,8 +54,8 @@ def asked_program(today: Today, scene: PlanningScene) -> AskedProgram:
     """Today's program as the planner is asked for it. Raises RequestError where it goes nowhere."""
     scene = _carrying(today, scene)
     stops = _Stops(scene)
-    steps: list[Asked] = []
-    moves: list[Stretch] = []
+    steps: list[StepToday] = []
+    moves: list[TodayMotion] = []
     last = len(today.stretches) - 1
     for k, one in enumerate(today.stretches):
         if one.trajectory is not None:
@@ -63,7 +63,9 @@ def asked_program(today: Today, scene: PlanningScene) -> AskedProgram:
             after = today.stretches[k + 1] if k < last else None
             if one.process is not None:
                 if after is None or after.process is not one.process:
-                    steps.append(Asked(ProgramStep("PATH", stops.path(one.process)), tuple(moves)))
+                    steps.append(
+                        StepToday(ProgramStep("PATH", stops.path(one.process)), tuple(moves))
+                    )
                     moves = []
                 continue
             if after is not None and after.process is not None:
@@ -72,11 +74,11 @@ def asked_program(today: Today, scene: PlanningScene) -> AskedProgram:
             waits = waits or (after is not None and after.load != one.load)
             name = stops.name(one.q, needed=one.works or waits or k == last)
             if name:
-                steps.append(Asked(stops.step(name), tuple(moves)))
+                steps.append(StepToday(stops.step(name), tuple(moves)))
                 moves = []
         elif one.seconds > 0.0:
             pause = ProgramStep("PAUSE", dwell=one.seconds, power_mode=AUTO)
-            steps.append(Asked(pause, (one,)))
+            steps.append(StepToday(pause, (one,)))
         elif steps:  # a standstill of no time: what is done in it belongs to the stop
             steps[-1] = replace(steps[-1], stretches=(*steps[-1].stretches, one))
     if not any(step.step.kind != "PAUSE" for step in steps):
@@ -88,8 +90,8 @@ def asked_program(today: Today, scene: PlanningScene) -> AskedProgram:
 
 
 def _at_stops(
-    steps: list[Asked], today: Today, scene: PlanningScene
-) -> tuple[list[Asked], list[str]]:
+    steps: list[StepToday], today: Today, scene: PlanningScene
+) -> tuple[list[StepToday], list[str]]:
     """The steps with parts and signals: the program's own, else the cell's where it makes the same
     stops.
     """
@@ -107,7 +109,7 @@ def _carrying(today: Today, scene: PlanningScene) -> PlanningScene:
     return replace(scene, cell=cell, loads=cell.loads())
 
 
-def _carried(steps: list[Asked], today: Today) -> list[Asked]:
+def _carried(steps: list[StepToday], today: Today) -> list[StepToday]:
     """The steps with what is carried after each, where today's program says it."""
     if not today.loads:
         return steps
@@ -123,12 +125,12 @@ def _carried(steps: list[Asked], today: Today) -> list[Asked]:
     return result
 
 
-def _with_signals(steps: list[Asked]) -> list[Asked]:
+def _with_signals(steps: list[StepToday]) -> list[StepToday]:
     """The steps with what the program itself waits for, sets, takes and leaves at them. What is
     waited for in a standstill counts before the next movement; what is taken or left in one is at
     the stop before, once more.
     """
-    result: list[Asked] = []
+    result: list[StepToday] = []
     awaited: list[Signal] = []
     at = ProgramStep("POSTURE", "home")
     for asked in steps:
@@ -145,7 +147,9 @@ def _with_signals(steps: list[Asked]) -> list[Asked]:
             there = replace(at, wait_for=(*awaited, *waits), set_signals=signals)
             awaited = []
             result.append(replace(asked, step=_handling(there, handled)))
-        result += [Asked(_handling(at, one), ()) for one in more if one and at.kind == "STATION"]
+        result += [
+            StepToday(_handling(at, one), ()) for one in more if one and at.kind == "STATION"
+        ]
     return result
 
 
@@ -158,7 +162,7 @@ def _handling(step: ProgramStep, handled: str) -> ProgramStep:
     return replace(step, attach=taken, detach=left)
 
 
-def _handled(steps: list[Asked], cell: Cell, start: str) -> tuple[list[Asked], list[str]]:
+def _handled(steps: list[StepToday], cell: Cell, start: str) -> tuple[list[StepToday], list[str]]:
     """The steps with what the cell's program handles at its stops, where it makes the same ones; a
     program that only begins in the posture `start` begins where today's does.
     """
@@ -248,7 +252,9 @@ class _Stops:
 # charge carried from step to step, pauses as the controller spends them by itself.
 
 
-def costed_steps(asked: tuple[Asked, ...], request: ProgramRequest) -> tuple[PlannedMovement, ...]:
+def costed_steps(
+    asked: tuple[StepToday, ...], request: ProgramRequest
+) -> tuple[PlannedMovement, ...]:
     """The steps of today's program from the request's start. Raises RequestError for one that
     handles what isn't there.
     """
@@ -283,7 +289,7 @@ class _Costing:
         self._charge = charge
         self._q: FloatArray = request.start
 
-    def movement(self, stretch: Stretch, here: str, there: str, scene: PlanningScene) -> None:
+    def movement(self, stretch: TodayMotion, here: str, there: str, scene: PlanningScene) -> None:
         """A movement of the hop from `here` to `there`."""
         assert stretch.trajectory is not None  # asked before
         along = stretch.process is not None
@@ -309,7 +315,7 @@ class _Costing:
         self.steps.append(self._charge.moved(step, found.energy, scene))
         self._q = stretch.q
 
-    def pause(self, stretch: Stretch, here: str, scene: PlanningScene) -> None:
+    def pause(self, stretch: TodayMotion, here: str, scene: PlanningScene) -> None:
         """A standstill."""
         pause = Pause(here, stretch.seconds, stretch.power_mode, self._q, scene)
         step = spent(pause, self._request.settings.transitions)

@@ -5,7 +5,7 @@ angle.
 from ir_planner.cartesian.path_parts import Arc, ArcLength, Line, Through, arc_through
 from ir_planner.cartesian.plan import (
     CartesianPlan,
-    Choice,
+    ChosenMovement,
     checked_path_options,
     choices_along,
     heading_status,
@@ -17,7 +17,7 @@ __all__ = [
     "Arc",
     "ArcLength",
     "CartesianPlan",
-    "Choice",
+    "ChosenMovement",
     "HeadingError",
     "Line",
     "PathRefusedError",

@@ -272,7 +272,7 @@ _LAYER = 10.0  # between layers in the tree of neighbours, further than any jump
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class ConfigurationChain:
     """Configurations q (N, n) and angles (N,) rad about the tool's axis at the samples s (N,) m;
     joules as estimated.
     """
@@ -291,7 +291,7 @@ def chains(
     *,
     by_start: bool = False,
     wide: float = 0.0,
-) -> list[Chain]:
+) -> list[ConfigurationChain]:
     """The cheapest chains through all layers, at most `most`, each with another end, or start
     (whole turns apart count once), at the tool's speed [m/s]. Raises NoChainError where none leads
     through.
@@ -322,13 +322,15 @@ def chains(
     last = np.flatnonzero((layer == len(layers.s) - 1) & np.isfinite(cost))
     if len(last) == 0:
         raise NoChainError(nodes[np.isfinite(cost)])
-    found: list[Chain] = []
+    found: list[ConfigurationChain] = []
     for node in _different(last, cost, q, family, scene, (apart, most)):
         trace = [int(node)]
         while parent[trace[-1]] >= 0:
             trace.append(int(parent[trace[-1]]))
         order = nodes[trace if by_start else trace[::-1]]
-        found.append(Chain(layers.s, layers.q[order], layers.angle[order], float(cost[node])))
+        found.append(
+            ConfigurationChain(layers.s, layers.q[order], layers.angle[order], float(cost[node]))
+        )
     return found
 
 

@@ -9,7 +9,7 @@ from ir_kernels import portable
 from ir_msgs_py.status import StatusCode
 from ir_planner.cartesian.chains import (
     JUMP,
-    Chain,
+    ConfigurationChain,
     Layers,
     chains,
     configurations_at,
@@ -20,7 +20,7 @@ from ir_planner.cartesian.chains import (
 )
 from ir_planner.cartesian.joint_curve import singularity
 from ir_planner.cartesian.path_parts import about_tool
-from ir_planner.cartesian.tool_path import Asked, NoChainError, PathRefusedError
+from ir_planner.cartesian.tool_path import NoChainError, PathRefusedError, ToolPathRequest
 from ir_planner.scene import PlanningScene
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
@@ -30,7 +30,7 @@ from ir_values.arrays import BoolArray, FloatArray, IntArray
 _DAMPED = 1e-6  # of the squared singular values
 
 
-def dead_end(asked: Asked, layers: Layers, reached: IntArray) -> PathRefusedError:
+def dead_end(asked: ToolPathRequest, layers: Layers, reached: IntArray) -> PathRefusedError:
     """The refusal with place, axis and what may help; reached (M,): configurations that chains lead
     to.
     """
@@ -59,7 +59,7 @@ def dead_end(asked: Asked, layers: Layers, reached: IntArray) -> PathRefusedErro
     )
 
 
-def _steps(asked: Asked, layers: Layers, at: IntArray, last: int) -> FloatArray:
+def _steps(asked: ToolPathRequest, layers: Layers, at: IntArray, last: int) -> FloatArray:
     """What the axes (M, n) would turn from configurations `at` (M,) to the next sample, by the
     Jacobian.
     """
@@ -109,7 +109,7 @@ def _jump(here: FloatArray, jumps: FloatArray, scene: PlanningScene) -> str:
     return f"{scene.cell.robot.joint_names[j]} by {jump:.0f} deg{singularity(here[h], scene)}"
 
 
-def _help(asked: Asked) -> str:
+def _help(asked: ToolPathRequest) -> str:
     angle = asked.path.free_angle
     helping = ["another orientation there"]
     if angle < np.pi - 1e-6:
@@ -129,8 +129,8 @@ _LOOKED_AT = 3  # chains that jump, whose intervals are divided
 
 
 def chains_through(
-    asked: Asked, layers: Layers, most: int, *, by_start: bool = False
-) -> tuple[list[Chain], Layers]:
+    asked: ToolPathRequest, layers: Layers, most: int, *, by_start: bool = False
+) -> tuple[list[ConfigurationChain], Layers]:
     """The cheapest chains as `chains` finds them, at finer samples where it takes them, and the
     layers with these. Raises PathRefusedError where no chain leads on.
 
@@ -155,8 +155,8 @@ def chains_through(
 
 
 def _chains_through(
-    asked: Asked, layers: Layers, most: int, *, by_start: bool
-) -> tuple[list[Chain], Layers]:
+    asked: ToolPathRequest, layers: Layers, most: int, *, by_start: bool
+) -> tuple[list[ConfigurationChain], Layers]:
     """The same, without regard to the limits of axes whose whole turns are left out."""
     speed = asked.speed
     space = asked.space
@@ -170,7 +170,7 @@ def _chains_through(
         raise dead_end(asked, layers, error.reached) from error
 
 
-def _divided(asked: Asked, layers: Layers) -> Layers:
+def _divided(asked: ToolPathRequest, layers: Layers) -> Layers:
     """The layers with finer samples wherever the cheapest chains jump, of those that may, until one
     jumps nowhere or nothing is left to divide.
     """
@@ -193,7 +193,7 @@ def _divided(asked: Asked, layers: Layers) -> Layers:
     return layers
 
 
-def closer_at(asked: Asked, layers: Layers, places: Iterable[float]) -> Layers:
+def closer_at(asked: ToolPathRequest, layers: Layers, places: Iterable[float]) -> Layers:
     """The layers with finer samples around places [m]; the same where nothing is left to divide."""
     last = len(layers.s) - 2
     open_ = np.zeros(last + 1, dtype=bool)
@@ -215,7 +215,7 @@ def _between(s: FloatArray, open_: BoolArray) -> FloatArray:
     return np.asarray((s[:-1, None] + share * np.diff(s)[:, None])[open_].ravel())
 
 
-def _with(layers: Layers, between: FloatArray, asked: Asked) -> Layers:
+def _with(layers: Layers, between: FloatArray, asked: ToolPathRequest) -> Layers:
     """The layers with all configurations at further samples (B,) m."""
     s = np.union1d(layers.s, between)
     more = configurations_at(

@@ -12,8 +12,8 @@ import numpy as np
 
 from ir_kernels import portable
 from ir_msgs_py.status import StatusCode
-from ir_planner.cartesian.chains import JUMP, Chain, turned_towards
-from ir_planner.cartesian.path_parts import Rates, about_tool, rates_of
+from ir_planner.cartesian.chains import JUMP, ConfigurationChain, turned_towards
+from ir_planner.cartesian.path_parts import RotationRates, about_tool, rates_of
 from ir_planner.cartesian.tool_path import PathRefusedError, StrayedError, ToolPath
 from ir_planner.checks import FreeSpace
 from ir_planner.scene import PlanningScene
@@ -51,11 +51,11 @@ class Angle:
         return self.spline.k > 1
 
     @cached_property
-    def rates(self) -> Rates:
+    def rates(self) -> RotationRates:
         """How fast it turns the tool."""
         if self.smooth:
             return rates_of(self.spline)
-        return Rates(float(np.abs(self.spline.derivative(1).c).max()))
+        return RotationRates(float(np.abs(self.spline.derivative(1).c).max()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,7 @@ def tool_poses(path: ToolPath, angle: Angle | None, s: FloatArray) -> FloatArray
 
 def curve_of(
     path: ToolPath,
-    chain: Chain,
+    chain: ConfigurationChain,
     angle: Angle | None,
     ends: tuple[float, float],
     scene: PlanningScene,
@@ -138,7 +138,9 @@ def curve_of(
     )
 
 
-def followed(poses: FloatArray, s: FloatArray, chain: Chain, scene: PlanningScene) -> FloatArray:
+def followed(
+    poses: FloatArray, s: FloatArray, chain: ConfigurationChain, scene: PlanningScene
+) -> FloatArray:
     """Configurations (M, n) at poses (M, 4, 4) at s (M,), each the nearest to the chain there."""
     near = np.column_stack([np.interp(s, chain.s, column) for column in chain.q.T])
     found = scene.inverse_kinematics_once.solve(poses)
@@ -230,7 +232,7 @@ class _Problem:
     """
 
     path: ToolPath
-    chain: Chain
+    chain: ConfigurationChain
     space: FreeSpace
     knots: FloatArray
     basis: FloatArray
@@ -242,7 +244,7 @@ class _Problem:
 
         return Angle(BSpline(self.knots, control, 3))
 
-    def reached(self, control: FloatArray, near: Chain) -> Chain | None:
+    def reached(self, control: FloatArray, near: ConfigurationChain) -> ConfigurationChain | None:
         """The chain with other angles; None where it isn't free or jumps."""
         angle = self.angle(control)
         s = self.chain.s
@@ -256,8 +258,8 @@ class _Problem:
 
 
 def angle_along(
-    path: ToolPath, chain: Chain, free_angle: float, space: FreeSpace, fixed: bool
-) -> tuple[Angle | None, Chain]:
+    path: ToolPath, chain: ConfigurationChain, free_angle: float, space: FreeSpace, fixed: bool
+) -> tuple[Angle | None, ConfigurationChain]:
     """The angle over the arc length, None: not free, and the chain with it. fixed: it begins as it
     does.
     """
@@ -290,7 +292,7 @@ def angle_along(
 
 
 def _problem(
-    path: ToolPath, chain: Chain, free_angle: float, space: FreeSpace, fixed: bool
+    path: ToolPath, chain: ConfigurationChain, free_angle: float, space: FreeSpace, fixed: bool
 ) -> _Problem:
     from scipy.interpolate import BSpline
 
@@ -303,7 +305,7 @@ def _problem(
     return _Problem(path, chain, space, knots, basis, bound, fixed)
 
 
-def _fitted(problem: _Problem) -> tuple[FloatArray, Chain] | None:
+def _fitted(problem: _Problem) -> tuple[FloatArray, ConfigurationChain] | None:
     """Control points near the search's steps, as smooth as configurations allow."""
     basis = problem.basis
     wanted = problem.chain.angles
@@ -324,7 +326,7 @@ def _fitted(problem: _Problem) -> tuple[FloatArray, Chain] | None:
     return None
 
 
-def _rates(chain: Chain, scene: PlanningScene) -> tuple[FloatArray, FloatArray]:
+def _rates(chain: ConfigurationChain, scene: PlanningScene) -> tuple[FloatArray, FloatArray]:
     """How much axes move (N - 1, n) and bend (N - 2, n) along the chain, as shares of their
     speeds.
     """
@@ -334,12 +336,12 @@ def _rates(chain: Chain, scene: PlanningScene) -> tuple[FloatArray, FloatArray]:
     return moves * np.sqrt(h), bends * np.sqrt(h[1:])
 
 
-def _cost(chain: Chain, scene: PlanningScene) -> float:
+def _cost(chain: ConfigurationChain, scene: PlanningScene) -> float:
     moves, bends = _rates(chain, scene)
     return float((moves * moves).sum() + (bends * bends).sum())
 
 
-def _step(problem: _Problem, control: FloatArray, chain: Chain) -> FloatArray:
+def _step(problem: _Problem, control: FloatArray, chain: ConfigurationChain) -> FloatArray:
     """The Gauss-Newton step (C,) within the free angle, none farther than _FARTHEST."""
     scene = problem.space.scene
     columns = list(_columns(problem, chain))
@@ -369,7 +371,7 @@ def _step(problem: _Problem, control: FloatArray, chain: Chain) -> FloatArray:
     return step
 
 
-def _columns(problem: _Problem, chain: Chain) -> Iterator[FloatArray]:
+def _columns(problem: _Problem, chain: ConfigurationChain) -> Iterator[FloatArray]:
     """Derivatives of what the axes move and bend by each control point."""
     scene = problem.space.scene
     jacobian = scene.chain.jacobian(chain.q)

@@ -6,13 +6,13 @@ import numpy as np
 
 from ir_msgs_py.cartesian import SPEED_TOLERANCE_MIN
 from ir_msgs_py.status import StatusCode
-from ir_planner.cartesian.chains import Chain, Layers, difference
+from ir_planner.cartesian.chains import ConfigurationChain, Layers, difference
 from ir_planner.cartesian.dead_ends import chains_through, closer_at
 from ir_planner.cartesian.joint_curve import Angle, JointCurve, angle_along, curve_of
 from ir_planner.cartesian.path_times import SentPath, sent, timed_stroke
 from ir_planner.cartesian.slowing import slower_between, unhurried
 from ir_planner.cartesian.speed_ramps import Span
-from ir_planner.cartesian.tool_path import Asked, PathRefusedError, StrayedError, ToolPath
+from ir_planner.cartesian.tool_path import PathRefusedError, StrayedError, ToolPath, ToolPathRequest
 from ir_planner.checks import ToolUse
 from ir_planner.curves import extremes
 from ir_planner.request import DURATION_MAX
@@ -46,7 +46,7 @@ class DrivenPath:
     movement: Movement
     sent: SentPath
     angle: Angle | None
-    chain: Chain
+    chain: ConfigurationChain
     slower: float = 1.0
     longer: bool = False
 
@@ -56,7 +56,7 @@ class DrivenPath:
         return max(float(stroke.law.last.max()) for stroke in self.sent.strokes)
 
 
-def best_along(asked: Asked, layers: Layers) -> DrivenPath:
+def best_along(asked: ToolPathRequest, layers: Layers) -> DrivenPath:
     """The certified movement of least cost by the request's objective over the cheapest chains;
     where no speed has to be kept, the shortest of those that are laid out for it and for less.
 
@@ -85,7 +85,7 @@ def best_along(asked: Asked, layers: Layers) -> DrivenPath:
     return best
 
 
-def _best_within_tolerance(asked: Asked, layers: Layers) -> DrivenPath:
+def _best_within_tolerance(asked: ToolPathRequest, layers: Layers) -> DrivenPath:
     """The same at the speed asked for; where that isn't found, evenly as much slower as may be."""
     try:
         return _best_at(asked, layers)
@@ -117,7 +117,7 @@ def _rates(fastest: float) -> list[float]:
 _STEPS = (1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
 
 
-def _best_at(asked: Asked, layers: Layers) -> DrivenPath:
+def _best_at(asked: ToolPathRequest, layers: Layers) -> DrivenPath:
     """The same at one speed. Raises PathRefusedError."""
     reason: PathRefusedError | None = None
     journal = asked.context.journal
@@ -140,7 +140,7 @@ def _best_at(asked: Asked, layers: Layers) -> DrivenPath:
     raise reason
 
 
-def _driven_chains(asked: Asked, layers: Layers) -> tuple[list[DrivenPath], Layers]:
+def _driven_chains(asked: ToolPathRequest, layers: Layers) -> tuple[list[DrivenPath], Layers]:
     """The cheapest chains that keep the speed, and the layers with the samples that it took. Raises
     PathRefusedError.
 
@@ -164,7 +164,9 @@ def _driven_chains(asked: Asked, layers: Layers) -> tuple[list[DrivenPath], Laye
     raise reasons[0]  # each chain that isn't driven gave one
 
 
-def _driven(asked: Asked, found: list[Chain]) -> tuple[list[DrivenPath], list[PathRefusedError]]:
+def _driven(
+    asked: ToolPathRequest, found: list[ConfigurationChain]
+) -> tuple[list[DrivenPath], list[PathRefusedError]]:
     """The first chains that keep the speed, by longer ramps if none does with short ones, and why
     the others don't.
     """
@@ -175,7 +177,7 @@ def _driven(asked: Asked, found: list[Chain]) -> tuple[list[DrivenPath], list[Pa
 
 
 def _driven_with(
-    asked: Asked, found: list[Chain], *, longer: bool
+    asked: ToolPathRequest, found: list[ConfigurationChain], *, longer: bool
 ) -> tuple[list[DrivenPath], list[PathRefusedError]]:
     driven: list[DrivenPath] = []
     reasons: list[PathRefusedError] = []
@@ -193,7 +195,7 @@ def _driven_with(
     return driven, reasons
 
 
-def _worth(chain: Chain, driven: list[DrivenPath], objective: str) -> bool:
+def _worth(chain: ConfigurationChain, driven: list[DrivenPath], objective: str) -> bool:
     """Whether a chain may be cheaper than those that are driven. One of the same joules is their
     mirror image with the wrist turned over; where joules decide, those that cost far more lose.
     """
@@ -204,7 +206,7 @@ def _worth(chain: Chain, driven: list[DrivenPath], objective: str) -> bool:
     return not (by_joules and known and chain.joules > min(known) * _COSTLIER + _COSTLIER_J)
 
 
-def farther_from_limits(asked: Asked, one: DrivenPath) -> DrivenPath:
+def farther_from_limits(asked: ToolPathRequest, one: DrivenPath) -> DrivenPath:
     """The same with more distance from the limits where the interpolant between points exceeds
     one.
     """
@@ -244,7 +246,9 @@ def _without(layers: Layers, one: DrivenPath) -> Layers:
     return replace(layers, free=layers.free & ~near)
 
 
-def timed(asked: Asked, chain: Chain, share: float = 1.0, *, longer: bool = False) -> DrivenPath:
+def timed(
+    asked: ToolPathRequest, chain: ConfigurationChain, share: float = 1.0, *, longer: bool = False
+) -> DrivenPath:
     """A chain with its time, within a share of the limits; longer: ramps reach as far as it takes.
     Raises PathRefusedError.
     """
@@ -306,7 +310,7 @@ def _as_slow_as_sent(path: SentPath, limits: MotionLimits, scene: PlanningScene)
     return path
 
 
-def _check_duration(duration: float, asked: Asked) -> None:
+def _check_duration(duration: float, asked: ToolPathRequest) -> None:
     if duration > DURATION_MAX:
         raise PathRefusedError(
             f"tool_speed {asked.path.tool_speed:g} m/s makes a movement of {duration:.4g} s along "
@@ -328,7 +332,7 @@ def _spans(whole: ToolPath, first: int, last: int, slower: float) -> tuple[Span,
     return tuple(spans)
 
 
-def _flange_share(asked: Asked, curves: list[JointCurve]) -> float:
+def _flange_share(asked: ToolPathRequest, curves: list[JointCurve]) -> float:
     """What share of the speed keeps the centre of the flange at T1's speed too."""
     path = asked.path
     context = asked.context

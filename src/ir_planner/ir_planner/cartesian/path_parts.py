@@ -281,7 +281,7 @@ class _Speed(Protocol):
 
 
 @dataclass(frozen=True)
-class Rates:
+class RotationRates:
     """Bounds of a rotation's derivatives along a path, |R'| [rad/m] and |R''| [rad/m^2], as 1 /
     sqrt(2) of
     their Frobenius norms: of turning about one axis that is the angle's rate.
@@ -290,9 +290,9 @@ class Rates:
     first: float = 0.0
     second: float = 0.0
 
-    def then(self, other: Rates) -> Rates:
+    def then(self, other: RotationRates) -> RotationRates:
         """Of the product of two rotations."""
-        return Rates(
+        return RotationRates(
             self.first + other.first, self.second + other.second + 2.0 * self.first * other.first
         )
 
@@ -320,10 +320,10 @@ class Evenly:
         return portable.matmul(self.start, rotation_of(share * self.turn))
 
     @property
-    def rates(self) -> Rates:
+    def rates(self) -> RotationRates:
         """How fast it turns."""
         rate = float(portable.norm(self.turn)) / self.length
-        return Rates(rate, rate * rate)
+        return RotationRates(rate, rate * rate)
 
 
 class ThroughPoses:
@@ -340,7 +340,7 @@ class ThroughPoses:
         return self._spline(np.clip(s, 0.0, self._end))
 
     @cached_property
-    def rates(self) -> Rates:
+    def rates(self) -> RotationRates:
         """How fast it turns: in each piece R = R_k exp(v) with a cubic v, so that |R'| <= |v'| and
         |R''| <= |v''| + 3/2 |v'|^2.
         """
@@ -351,13 +351,13 @@ class ThroughPoses:
         bulge = h[:, 0] ** 2 / 8.0 * np.linalg.norm(6.0 * cubic, axis=1)
         rate = np.max([np.linalg.norm(one, axis=1) for one in first], axis=0) + bulge
         bend = np.max([np.linalg.norm(one, axis=1) for one in second], axis=0)
-        return Rates(float(rate.max()), float((bend + 1.5 * (rate * rate)).max()))
+        return RotationRates(float(rate.max()), float((bend + 1.5 * (rate * rate)).max()))
 
 
-def rates_of(angle: BSpline) -> Rates:
+def rates_of(angle: BSpline) -> RotationRates:
     """Of turning about one axis by a spline, by the hulls of its derivatives' control points."""
     first, second = (float(np.abs(angle.derivative(nu).c).max()) for nu in (1, 2))
-    return Rates(first, second + first * first)
+    return RotationRates(first, second + first * first)
 
 
 def turn_between(first: FloatArray, second: FloatArray) -> float:
@@ -390,7 +390,7 @@ _OPPOSITE = np.radians(179.0)  # beyond, the shortest turn isn't known
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class PathPart:
     """A curve of the tool with its orientations, the speed that is asked for [m/s], and whether
     that has to
     be kept: on an approach and a retract it needn't.
@@ -418,9 +418,9 @@ class Part:
         return first, last
 
 
-def parts_of(path: CartesianPath) -> tuple[Part, ...]:
+def parts_of(path: CartesianPath) -> tuple[PathPart, ...]:
     """Approach, segments and retract of a path. Raises RequestError for what draws nothing."""
-    parts: list[Part] = []
+    parts: list[PathPart] = []
     here = np.array(path.start)
     _check_place(here, "start_pose")
     for k, segment in enumerate(path.segments):
@@ -440,7 +440,9 @@ def parts_of(path: CartesianPath) -> tuple[Part, ...]:
     return (*before, *parts, *after)
 
 
-def _segment(segment: CartesianSegment, here: FloatArray, name: str, path: CartesianPath) -> Part:
+def _segment(
+    segment: CartesianSegment, here: FloatArray, name: str, path: CartesianPath
+) -> PathPart:
     poses = [here, *(np.array(pose) for pose in segment.poses)]
     for k, pose in enumerate(poses[1:]):
         _check_place(pose, f"{name}.poses[{k}]")
@@ -457,7 +459,7 @@ def _segment(segment: CartesianSegment, here: FloatArray, name: str, path: Carte
     return replace(part, speed=min(part.speed, turning / most)) if turning * most > 0.0 else part
 
 
-def _in_place(poses: list[FloatArray], name: str, speed: float, path: CartesianPath) -> Part:
+def _in_place(poses: list[FloatArray], name: str, speed: float, path: CartesianPath) -> PathPart:
     """The turn between two poses (4, 4) at one place, at `speed` rad/s."""
     if path.orientation == TANGENT:
         raise _refused(f"{name} turns in place: with orientation {TANGENT} the path says how")
@@ -471,10 +473,12 @@ def _in_place(poses: list[FloatArray], name: str, speed: float, path: CartesianP
         )
     length = TURN_LENGTH * turn
     turning = Evenly.between(first, last, length)
-    return Part(name, Still(poses[0][:3, 3], length), turning, TURN_LENGTH * speed)
+    return PathPart(name, Still(poses[0][:3, 3], length), turning, TURN_LENGTH * speed)
 
 
-def _moving(segment: CartesianSegment, poses: list[FloatArray], name: str, speed: float) -> Part:
+def _moving(
+    segment: CartesianSegment, poses: list[FloatArray], name: str, speed: float
+) -> PathPart:
     places = np.array([pose[:3, 3] for pose in poses])
     curve: PlaceCurve
     if segment.kind == LINE:
@@ -493,13 +497,13 @@ def _moving(segment: CartesianSegment, poses: list[FloatArray], name: str, speed
     _check_turns(poses, name)
     if isinstance(curve, Through) and len(poses) > 2:
         rotations = np.array([pose[:3, :3] for pose in poses])
-        return Part(name, curve, ThroughPoses(curve.at_points, rotations), speed)
-    return Part(
+        return PathPart(name, curve, ThroughPoses(curve.at_points, rotations), speed)
+    return PathPart(
         name, curve, Evenly.between(poses[0][:3, :3], poses[-1][:3, :3], curve.length), speed
     )
 
 
-def _along_axis(pose: FloatArray, by: float, path: CartesianPath, name: str) -> Part:
+def _along_axis(pose: FloatArray, by: float, path: CartesianPath, name: str) -> PathPart:
     """The line between a pose (4, 4) and the place `by` m along the tool's axis."""
     ends = [pose[:3, 3] + by * pose[:3, 0], pose[:3, 3]]
     if abs(by) < SHORTEST:
@@ -508,7 +512,7 @@ def _along_axis(pose: FloatArray, by: float, path: CartesianPath, name: str) -> 
         )
     first, last = ends if name == "approach" else ends[::-1]
     line = Line(np.array(first), np.array(last))
-    return Part(
+    return PathPart(
         name, line, Evenly(np.array(pose[:3, :3]), np.zeros(3), line.length), path.tool_speed, False
     )
 

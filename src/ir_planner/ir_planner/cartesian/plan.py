@@ -13,7 +13,7 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlanningInfo, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.cartesian.chains import Chain, Layers, layers_of
+from ir_planner.cartesian.chains import ConfigurationChain, Layers, layers_of
 from ir_planner.cartesian.dead_ends import chains_through
 from ir_planner.cartesian.path_movement import (
     T1_SPEED,
@@ -23,14 +23,14 @@ from ir_planner.cartesian.path_movement import (
     timed,
 )
 from ir_planner.cartesian.path_parts import TURN_LENGTH, TURN_SPEED, parts_of
-from ir_planner.cartesian.tool_error import Kept, kept_of
+from ir_planner.cartesian.tool_error import PathAccuracy, kept_of
 from ir_planner.cartesian.tool_path import (
     REVERSAL,
-    Asked,
     HeadingError,
     Joint,
     PathRefusedError,
     ToolPath,
+    ToolPathRequest,
     joined,
 )
 from ir_planner.checks import FreeSpace
@@ -85,7 +85,7 @@ TOOL_ERROR_MAX = 1e-4  # m
 class Drawn:
     """What is asked for, how its parts are joined, and the configurations along it."""
 
-    asked: Asked
+    asked: ToolPathRequest
     joints: tuple[Joint, ...]
     layers: Layers
 
@@ -95,7 +95,7 @@ class Drawn:
         whole = self.asked.whole
         return whole.ends[1:][[part.kept for part in whole.parts]]
 
-    def kept(self, driven: DrivenPath) -> Kept:
+    def kept(self, driven: DrivenPath) -> PathAccuracy:
         """What a movement keeps of the path. Raises PathRefusedError where that isn't enough."""
         found = kept_of(driven.sent, self.asked.whole, driven.angle, self.asked.context.scene)
         leaves = max((joint.leaves for joint in self.joints), default=0.0)
@@ -126,7 +126,7 @@ def drawn(path: CartesianPath, start: FloatArray | None, t1: bool, context: Cont
         notes.append(f"{whole.length:.3f} m in {len(whole.parts)} parts")
         if (reduced := _reduced(path, whole, joints)) < path.blending_radius:
             notes.append(f"blending radius down to {reduced:.4g} m: half of a part")
-    asked = Asked(path, whole, start is not None, t1, context)
+    asked = ToolPathRequest(path, whole, start is not None, t1, context)
     with context.journal.stage("configurations") as notes:
         layers = layers_of(whole, path.free_angle, asked.space, start)
         notes.append(f"{len(layers.q)} at {len(layers.s)} samples, {int(layers.free.sum())} free")
@@ -188,7 +188,7 @@ _TURNS = (-2, -1, 0, 1, 2)
 
 
 @dataclass(frozen=True, eq=False)
-class Choice:
+class ChosenMovement:
     """A movement along a path with its configurations (N, n) from its beginning to its end."""
 
     points: FloatArray
@@ -197,7 +197,7 @@ class Choice:
 
 def choices_along(
     path: CartesianPath, context: Context, after: FreeSpace, most: int
-) -> list[Choice]:
+) -> list[ChosenMovement]:
     """Certified movements whose ends keep the safety distance from everything, at their end also in
     the space `after`; at most `most`. Raises PathRefusedError, HeadingError, RequestError.
     """
@@ -242,13 +242,13 @@ def _ends_free(whole: Drawn, after: FreeSpace) -> BoolArray:
     return free
 
 
-def _different(whole: Drawn) -> list[Chain]:
+def _different(whole: Drawn) -> list[ConfigurationChain]:
     """The cheapest chains by their ends and by their starts, each once, cheapest first."""
     asked = whole.asked
     layers = whole.layers
     by_end, layers = chains_through(asked, layers, _OF_EACH)
     by_start, _ = chains_through(asked, layers, _OF_EACH, by_start=True)
-    kept: list[Chain] = []
+    kept: list[ConfigurationChain] = []
     for chain in sorted((*by_end, *by_start), key=lambda one: one.joules):
         if all(
             np.abs(portable.sin(0.5 * (chain.q - other.q))).max() > 0.5 * _SAME for other in kept
@@ -257,7 +257,7 @@ def _different(whole: Drawn) -> list[Chain]:
     return kept
 
 
-def _turned(driven: DrivenPath) -> Iterator[Choice]:
+def _turned(driven: DrivenPath) -> Iterator[ChosenMovement]:
     """A movement as it is, then by whole turns of joints as far as their limits allow."""
     movement = driven.movement
     robot = movement.context.scene.cell.robot
@@ -272,10 +272,12 @@ def _turned(driven: DrivenPath) -> Iterator[Choice]:
     own = trajectory.positions
     for shift in sorted(itertools.product(*turns), key=lambda one: sum(map(abs, one))):
         if not any(shift):
-            yield Choice(own, movement)
+            yield ChosenMovement(own, movement)
             continue
         moved = own + 2.0 * np.pi * np.array(shift)
-        yield Choice(moved, replace(movement, trajectory=replace(trajectory, positions=moved)))
+        yield ChosenMovement(
+            moved, replace(movement, trajectory=replace(trajectory, positions=moved))
+        )
 
 
 # What whoever drives a path should know of its speed.
@@ -283,7 +285,7 @@ def _turned(driven: DrivenPath) -> Iterator[Choice]:
 _REACHED = 0.999  # of a speed
 
 
-def remarks(drawn: Asked, found: DrivenPath) -> Iterator[tuple[str, str]]:
+def remarks(drawn: ToolPathRequest, found: DrivenPath) -> Iterator[tuple[str, str]]:
     """Names and texts of remarks: T1 slows the tool, ramps are long, or the speed isn't reached."""
     path = drawn.path
     whole = drawn.whole

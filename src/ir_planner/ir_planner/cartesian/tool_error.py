@@ -33,7 +33,7 @@ _ROOT = np.sqrt(2.0)
 
 
 @dataclass(frozen=True)
-class Kept:
+class PathAccuracy:
     """Bounds: tool_error [m]; rotation_error [rad]; speed_deviation: share of the speed asked
     for.
     """
@@ -42,15 +42,19 @@ class Kept:
     rotation_error: float = 0.0
     speed_deviation: float = 0.0
 
-    def worse(self, other: "Kept") -> "Kept":
+    def worse(self, other: "PathAccuracy") -> "PathAccuracy":
         """The larger ones."""
-        return Kept(*(max(a, b) for a, b in zip(astuple(self), astuple(other), strict=True)))
+        return PathAccuracy(
+            *(max(a, b) for a, b in zip(astuple(self), astuple(other), strict=True))
+        )
 
 
-def kept_of(sent: SentPath, path: ToolPath, angle: Angle | None, scene: PlanningScene) -> Kept:
+def kept_of(
+    sent: SentPath, path: ToolPath, angle: Angle | None, scene: PlanningScene
+) -> PathAccuracy:
     """What the trajectory that is sent keeps of the path."""
     motion = tool_derivatives(sent.trajectory, scene)
-    kept = Kept()
+    kept = PathAccuracy()
     for k in range(len(sent.strokes)):
         judged = _Stroke(sent, k, path, angle, scene, motion)
         tau = judged.instants()
@@ -108,7 +112,7 @@ class _Stroke:
             np.concatenate([np.linspace(a, b, n + 1)[:-1] for a, b, n in pieces]), tau[-1]
         )
 
-    def kept(self, tau: FloatArray) -> Kept:
+    def kept(self, tau: FloatArray) -> PathAccuracy:
         """The bounds from the first of tau (M,) s to the last."""
         asked = self.sent.strokes[self.k].at(tau)
         times = self.times(tau)
@@ -128,7 +132,7 @@ class _Stroke:
         velocity = np.einsum("mij,mj->mi", rows, moved.qd)
         sags = squared * self.motion.between(self.third, times) / 8.0
         turn = 2.0 * portable.arcsin(min(norm / (2.0 * _ROOT), 1.0))
-        return Kept(away, float(turn), self._off(tau, velocity, sags))
+        return PathAccuracy(away, float(turn), self._off(tau, velocity, sags))
 
     def _turned(self, u: FloatArray) -> FloatArray:
         """By how much (M - 1,) rotations asked for leave their chords between u (M,) m and the

@@ -13,7 +13,7 @@ import numpy as np
 from ir_kernels import portable
 from ir_msgs_py.cartesian import TANGENT, CartesianPath
 from ir_msgs_py.status import Status, StatusCode
-from ir_planner.cartesian.path_parts import ArcLength, Part, Rates, about_tool, rates_of
+from ir_planner.cartesian.path_parts import ArcLength, PathPart, RotationRates, about_tool, rates_of
 from ir_planner.checks import FreeSpace
 from ir_planner.curves import turn_of
 from ir_planner.request import Context
@@ -51,7 +51,7 @@ def covering(u: FloatArray, radius: float) -> FloatArray:
     return np.asarray(portable.power(y, 4) * (35.0 + y * (-84.0 + y * (70.0 - 20.0 * y))))
 
 
-def joint_bend(before: Part, after: Part, radius: float) -> float:
+def joint_bend(before: PathPart, after: PathPart, radius: float) -> float:
     """A bound [1/m] of the second derivative by u of the place within a radius [m] around a corner.
 
     There p'' = k1 c1'^2 + k2 c2'^2 + (t2 - t1) c'', with c' <= 1, c'' <= 35 / (32 radius), and
@@ -81,7 +81,7 @@ class ToolPath:
     end, 0: the tool stops there. headings: whether the tool turns with the path.
     """
 
-    parts: tuple[Part, ...]
+    parts: tuple[PathPart, ...]
     radius: FloatArray
     headings: bool = False
 
@@ -156,7 +156,7 @@ class ToolPath:
         ):
             if radius > 0.0:
                 both = parts[0].turning.rates.then(parts[1].turning.rates)
-                bent = Rates(both.first, both.second + both.first * 35.0 / (32.0 * radius))
+                bent = RotationRates(both.first, both.second + both.first * 35.0 / (32.0 * radius))
                 zones.append((corner - radius, corner + radius, bent))
         for begin, end, rates in zones:
             if self.headings:
@@ -216,7 +216,7 @@ class ToolPath:
         owner = np.clip(np.searchsorted(self.corners, u, side="right") - 1, 0, len(self.parts) - 1)
         return [(int(k), np.flatnonzero(owner == k)) for k in np.unique(owner)]
 
-    def _moving(self, k: int, u: FloatArray) -> list[tuple[Part, FloatArray, FloatArray]]:
+    def _moving(self, k: int, u: FloatArray) -> list[tuple[PathPart, FloatArray, FloatArray]]:
         """Parts under way where part k is: how far each is (M,) m, and its rate (M,) by u."""
         part = self.parts[k]
         first = u - self.corners[k]
@@ -321,7 +321,7 @@ class Joint:
     rounded: bool = False
 
 
-def joined(path: CartesianPath, parts: tuple[Part, ...]) -> tuple[ToolPath, tuple[Joint, ...]]:
+def joined(path: CartesianPath, parts: tuple[PathPart, ...]) -> tuple[ToolPath, tuple[Joint, ...]]:
     """The parts one after the other, and the joints between them; approach and retract are not
     rounded.
     """
@@ -333,7 +333,7 @@ def joined(path: CartesianPath, parts: tuple[Part, ...]) -> tuple[ToolPath, tupl
     return ToolPath(parts, radius, path.orientation == TANGENT), joints
 
 
-def joint_between(before: Part, after: Part, asked: float) -> Joint:
+def joint_between(before: PathPart, after: PathPart, asked: float) -> Joint:
     """How two parts are joined, with the radius [m] that is asked for."""
     if before.in_place or after.in_place:
         return Joint(0.0, 0.0)
@@ -357,7 +357,7 @@ def joint_between(before: Part, after: Part, asked: float) -> Joint:
     return Joint(min(asked, half), angle, rounded=asked > 0.0)
 
 
-def _left_by(before: Part, after: Part, radius: float) -> tuple[float, float]:
+def _left_by(before: PathPart, after: PathPart, radius: float) -> tuple[float, float]:
     """A bound of the distance [m], and the largest turn [rad], between joined and unjoined parts at
     the same length.
     """
@@ -395,7 +395,7 @@ def _turn(first: FloatArray, second: FloatArray) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class ToolPathRequest:
     """The path, as it is drawn, whether its first configuration is given, and T1. rate: times what
     is asked for the movement is laid out; where that is above 1 it is then slowed to it.
     """

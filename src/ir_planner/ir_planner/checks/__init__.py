@@ -26,7 +26,7 @@ from ir_planner.checks.free_space import (
     too_near_sentence,
 )
 from ir_planner.checks.intervals import (
-    Interval,
+    JouleInterval,
     energy_and_slope,
     holding_slope,
     interval,
@@ -69,7 +69,7 @@ __all__ = [
     "Consumption",
     "Evaluation",
     "FreeSpace",
-    "Interval",
+    "JouleInterval",
     "MovementEnergy",
     "Shape",
     "StateCheck",

@@ -185,7 +185,7 @@ def _carried(at: _States, scene: PlanningScene) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Interval:
+class JouleInterval:
     """5 % and 95 % quantile, J."""
 
     low: float
@@ -222,8 +222,8 @@ def movement_spread(trajectory: JointTrajectory, scene: PlanningScene) -> FloatA
     return expected_energy - sampled_energy(at, scene) + portable.matmul(drawn, slope)
 
 
-def interval(nominal: float, added: FloatArray) -> Interval:
+def interval(nominal: float, added: FloatArray) -> JouleInterval:
     """The 90 % interval of an energy [J] to which the drawn robots add `added` (ROBOTS,) J; it
     holds the nominal one.
     """
-    return Interval(*interval_over(nominal, added))
+    return JouleInterval(*interval_over(nominal, added))

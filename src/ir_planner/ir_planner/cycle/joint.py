@@ -51,7 +51,7 @@ class ArmWork:
 
 
 @dataclass(frozen=True, order=True)
-class Stretch:
+class ZoneStretch:
     """`count` movements of a robot from number `first` on, with the stops between them; over the
     end of its program it goes on at its begin.
     """
@@ -67,8 +67,8 @@ class Zone:
     the other one in every cycle; of both, no cycle is possible.
     """
 
-    one: Stretch
-    other: Stretch
+    one: ZoneStretch
+    other: ZoneStretch
     first: tuple[int, ...] = ()
 
 
@@ -179,7 +179,7 @@ class _Model:
             program.row(terms, low=lag.seconds + work.movements[lag.earlier].seconds[0])
         return begin
 
-    def _end(self, stretch: Stretch) -> tuple[dict[int, float], float]:
+    def _end(self, stretch: ZoneStretch) -> tuple[dict[int, float], float]:
         """Terms and constant of the end of a stretch: of its last movement."""
         work = self._works[stretch.robot]
         count = len(work.movements)
@@ -301,7 +301,7 @@ class _Group:
     def zone(self, robots: tuple[int, int], counts: tuple[int, int]) -> Zone:
         """The same in movements."""
         stretches = [
-            Stretch(robot, span[0] // 2, min((span[1] + span[0] % 2 + 1) // 2, count))
+            ZoneStretch(robot, span[0] // 2, min((span[1] + span[0] % 2 + 1) // 2, count))
             for robot, span, count in zip(robots, (self.one, self.other), counts, strict=True)
         ]
         return Zone(stretches[0], stretches[1], tuple(sorted(self.first)))

@@ -1,6 +1,6 @@
 """The flexible cell: parts go through machines that work meanwhile; the cheapest steady cycle."""
 
-from ir_planner.flexible.columns import RUNGS, Column, slowed_down
+from ir_planner.flexible.columns import RUNGS, MovementColumn, slowed_down
 from ir_planner.flexible.steady_plan import (
     CyclePoint,
     CycleStep,
@@ -24,10 +24,10 @@ from ir_planner.flexible.surprises import (
 __all__ = [
     "RUNGS",
     "SHARES",
-    "Column",
     "CountedTimes",
     "CyclePoint",
     "CycleStep",
+    "MovementColumn",
     "OutageReplay",
     "ReplayedPart",
     "SteadyPlan",

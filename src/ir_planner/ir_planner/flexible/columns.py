@@ -16,10 +16,10 @@ from ir_planner.program import (
     ACROSS,
     ENTER,
     LEAVE,
+    HopPart,
     Ladder,
     Movements,
     Node,
-    Part,
     PlacedStep,
     ProgramRequest,
     Route,
@@ -46,18 +46,18 @@ _SLOWER = (1.15, 1.3, 1.5, 1.75, 2.0, 2.5, 3.0)  # times the slowest, where a wa
 
 
 @dataclass(frozen=True, eq=False)
-class Column:
+class MovementColumn:
     """Certified movements between two places, fastest first, and the convex curve below them."""
 
     movements: tuple[Movement, ...]
     curve: Curve
 
     @staticmethod
-    def of(movements: Sequence[Movement]) -> Column:
+    def of(movements: Sequence[Movement]) -> MovementColumn:
         """The column of movements."""
         known = sorted(movements, key=lambda each: each.trajectory.duration)
         points = [(each.trajectory.duration, each.energy.total) for each in known]
-        return Column(tuple(known), Curve.below(points))
+        return MovementColumn(tuple(known), Curve.below(points))
 
     def taking(self, seconds: float) -> Movement:
         """The cheapest certified movement that takes at most `seconds`: one of the column, or one
@@ -74,7 +74,7 @@ class Column:
 
 
 @dataclass(frozen=True, eq=False)
-class Tending:
+class TendedRoute:
     """A route in its cell. nodes: the configuration at each station; columns: all movements."""
 
     cell: Cell
@@ -82,7 +82,7 @@ class Tending:
     scenes: Scenes
     nodes: Mapping[str, Node]
     choices: Mapping[str, list[Node]]
-    columns: Mapping[Key, Column]
+    columns: Mapping[Key, MovementColumn]
 
     @property
     def empty(self) -> PlanningScene:
@@ -90,7 +90,7 @@ class Tending:
         return self.scenes.of(all_lying(self.route))
 
 
-def planned_columns(request: ProgramRequest, route: PartRoute, context: Context) -> Tending:
+def planned_columns(request: ProgramRequest, route: PartRoute, context: Context) -> TendedRoute:
     """The configurations of the cheapest way of a part along its route, and the movements between
     all stations. Raises StageError for a station that can't be reached.
     """
@@ -118,10 +118,10 @@ def planned_columns(request: ProgramRequest, route: PartRoute, context: Context)
         fronts = values.fronts()
         notes.append(f"{len(parts)} movements at {len(RUNGS)} values of a second")
     columns = {
-        key: Column.of(slowed_down([point.movement for point in fronts[part]]))
+        key: MovementColumn.of(slowed_down([point.movement for point in fronts[part]]))
         for part, key in parts.items()
     }
-    return Tending(request.cell, route, scenes, nodes, choices, columns)
+    return TendedRoute(request.cell, route, scenes, nodes, choices, columns)
 
 
 def slowed_down(front: list[Movement]) -> list[Movement]:
@@ -148,17 +148,17 @@ def _hops(route: PartRoute) -> list[tuple[str, str, PartPlaces]]:
     return loaded + empty
 
 
-def _parts(hops: Sequence[tuple[str, str, PartPlaces]]) -> dict[Part, Key]:
+def _parts(hops: Sequence[tuple[str, str, PartPlaces]]) -> dict[HopPart, Key]:
     """The movements of all hops; those along service lines once for each station."""
-    parts: dict[Part, Key] = {}
+    parts: dict[HopPart, Key] = {}
     seen = set[Key]()
     for k, (start, end, places) in enumerate(hops):
         hop = 2 * k + 1
         loaded = places.held != ""
         for part, key in (
-            (Part(hop, LEAVE, 0, -1), (LEAVE, start, start, loaded)),
-            (Part(hop, ACROSS, 0, 0), (ACROSS, start, end, loaded)),
-            (Part(hop, ENTER, -1, 0), (ENTER, end, end, loaded)),
+            (HopPart(hop, LEAVE, 0, -1), (LEAVE, start, start, loaded)),
+            (HopPart(hop, ACROSS, 0, 0), (ACROSS, start, end, loaded)),
+            (HopPart(hop, ENTER, -1, 0), (ENTER, end, end, loaded)),
         ):
             if key not in seen:
                 seen.add(key)

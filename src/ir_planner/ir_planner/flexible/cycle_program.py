@@ -121,7 +121,7 @@ def _since(waits: Sequence[Wait], due: Due | None, names: Sequence[str]) -> list
 
 
 @dataclass(frozen=True, eq=False)
-class Lengths:
+class CycleLengths:
     """Seconds that the robot takes: by activity and unit, and for the empty hop after these by the
     activity that follows.
     """
@@ -179,7 +179,7 @@ class _Line:
 
 
 def run_program(
-    cell: Cell, cycle: SteadyCycle, lengths: Lengths, cycles: int
+    cell: Cell, cycle: SteadyCycle, lengths: CycleLengths, cycles: int
 ) -> tuple[tuple[ProgramStep, ...], tuple[int, ...]]:
     """The steps, and the units of their transports: from an empty line, in front of the first
     station, until so many cycles were made in which every transport was; the robot is in front of

@@ -12,8 +12,8 @@ from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import interval
 from ir_planner.cycle import SteadyCycle, Visit, Wait
-from ir_planner.flexible.columns import Tending, UnitKey, activity_keys, exact
-from ir_planner.flexible.cycle_program import Lengths, cycle_program, occupied, run_program
+from ir_planner.flexible.columns import TendedRoute, UnitKey, activity_keys, exact
+from ir_planner.flexible.cycle_program import CycleLengths, cycle_program, occupied, run_program
 from ir_planner.flexible.tending_cell import (
     front_name,
     machines_of,
@@ -24,17 +24,17 @@ from ir_planner.program import (
     ACROSS,
     ENTER,
     MOTORS,
-    Chain,
     Choice,
+    HopPart,
     Ladder,
     Movements,
     Node,
-    Part,
     ProgramRequest,
     Route,
     Scenes,
     Spreads,
     StageError,
+    StationChain,
     common_program,
     placed_steps,
     rests_at,
@@ -83,7 +83,7 @@ class RouteSteps:
     """
 
     def __init__(
-        self, request: ProgramRequest, tending: Tending, first: int, finished: Sequence[int]
+        self, request: ProgramRequest, tending: TendedRoute, first: int, finished: Sequence[int]
     ) -> None:
         self.tending = tending
         self.cell = _cell_of(request.cell, tending, finished)
@@ -115,7 +115,7 @@ class RouteSteps:
         context = context.inside(self._scenes.before(route.steps[0]))
         settings = self.request.settings
         movements = Movements(route, layers, context, settings.searches)
-        chain = Chain([0] * len(layers), 0.0, 0.0, 0.0)
+        chain = StationChain([0] * len(layers), 0.0, 0.0, 0.0)
         return Choice(self.request, Ladder(movements, settings.improvement_iterations), chain)
 
     def steps(
@@ -138,7 +138,7 @@ class RouteSteps:
         return choice.steps(found)
 
     def _exact(
-        self, part: Part, route: Route, movements: Mapping[UnitKey, Movement], unit: int
+        self, part: HopPart, route: Route, movements: Mapping[UnitKey, Movement], unit: int
     ) -> Movement:
         ends = [self._station(route.name(part.hop - 1)), self._station(route.name(part.hop))]
         if part.kind != ACROSS:
@@ -160,7 +160,7 @@ class RouteSteps:
         return self._names.get(name, name)
 
 
-def _cell_of(cell: Cell, tending: Tending, finished: Sequence[int]) -> Cell:
+def _cell_of(cell: Cell, tending: TendedRoute, finished: Sequence[int]) -> Cell:
     """With as many parts as can be in flight, one more than machines and one for the gripper; those
     at the machines before which one lies finished, the others aren't there yet.
     """
@@ -182,7 +182,7 @@ class CycleSteps:
     def __init__(
         self,
         request: ProgramRequest,
-        tending: Tending,
+        tending: TendedRoute,
         cycle: SteadyCycle,
         movements: Mapping[UnitKey, Movement],
         context: Context,
@@ -211,7 +211,7 @@ class CycleSteps:
         steps = route.steps(program, units, self._movements, self._context)
         return replace(route.cell, program=program), steps
 
-    def _run_lengths(self) -> Lengths:
+    def _run_lengths(self) -> CycleLengths:
         """Seconds of every activity and every empty hop in the chosen movements."""
         visits = self._tending.route.visits
         count = len(visits) - 1
@@ -230,7 +230,7 @@ class CycleSteps:
             if b not in (a, a + 1)
             for unit in units
         }
-        return Lengths(activities, hops)
+        return CycleLengths(activities, hops)
 
     def _along(self, cycle: SteadyCycle, nodes: Mapping[str, Sequence[Node]]) -> Choice:
         return self._route.along(cycle_program(self._route.cell, cycle), nodes, self._context)
@@ -266,7 +266,9 @@ class CycleSteps:
                 more += rests.motors * wait.seconds - rests.cost((), wait.seconds)[0]
         return more
 
-    def _as_soon_as_possible(self, choice: Choice, found: Mapping[Part, Movement]) -> SteadyCycle:
+    def _as_soon_as_possible(
+        self, choice: Choice, found: Mapping[HopPart, Movement]
+    ) -> SteadyCycle:
         """The cycle of other movements in the same order that waits for machines only, and at its
         end until the period is over.
         """
@@ -300,7 +302,9 @@ class CycleSteps:
         period = max(period, self._cycle.period)
         return SteadyCycle(tuple(again), period, self._cycle.units, np.nan, np.nan)
 
-    def _lengths(self, choice: Choice, found: Mapping[Part, Movement]) -> list[tuple[float, float]]:
+    def _lengths(
+        self, choice: Choice, found: Mapping[HopPart, Movement]
+    ) -> list[tuple[float, float]]:
         """Seconds of every activity and of the hop after it."""
         route = choice.movements.route
         handling = 2.0 * self._tending.route.handling

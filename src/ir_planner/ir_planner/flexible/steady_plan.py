@@ -25,9 +25,9 @@ from ir_planner.cycle import (
 )
 from ir_planner.errors import RequestError
 from ir_planner.flexible.columns import (
-    Column,
     Key,
-    Tending,
+    MovementColumn,
+    TendedRoute,
     UnitKey,
     activity_keys,
     planned_columns,
@@ -298,7 +298,7 @@ class _Chosen:
 class _TendingModel:
     """The linear problem of a route, and its solutions as certified movements."""
 
-    def __init__(self, request: ProgramRequest, tending: Tending) -> None:
+    def __init__(self, request: ProgramRequest, tending: TendedRoute) -> None:
         self.request = request
         self.tending = tending
         visits = tending.route.visits
@@ -401,11 +401,12 @@ class _TendingModel:
         for unit in range(units):
             for a in range(len(self.visits) - 1):
                 curves = [
-                    Column.of([movements[key, unit]]).curve for key in activity_keys(self.visits, a)
+                    MovementColumn.of([movements[key, unit]]).curve
+                    for key in activity_keys(self.visits, a)
                 ]
                 own[a, unit] = self._with_handling(in_turn(curves), a)
             for (a, b), key in self._hops().items():
-                hops[(a, unit), b] = Column.of([movements[key, unit]]).curve
+                hops[(a, unit), b] = MovementColumn.of([movements[key, unit]]).curve
         return replace(self.problem, own=own, own_hops=hops)
 
 

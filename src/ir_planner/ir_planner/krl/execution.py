@@ -28,7 +28,7 @@ from ir_krl import (
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.trajectory import NS_PER_S, JointTrajectory
 from ir_planner.krl.geometry import Arm
-from ir_planner.krl.motions import AxisLine, Curve, Move, move, overlap, tool_curve, trajectory
+from ir_planner.krl.motions import AxisLine, AxisPath, Move, move, overlap, tool_curve, trajectory
 from ir_planner.krl.splines import (
     ToolMotion,
     block_curve,
@@ -39,7 +39,7 @@ from ir_planner.krl.splines import (
     tool_spline,
 )
 from ir_planner.krl.surroundings import Surroundings, nothing_around
-from ir_planner.krl.triggers import Stage, along_path, instant, stages_at, stages_of
+from ir_planner.krl.triggers import MotionPhase, along_path, instant, stages_at, stages_of
 from ir_planner.scene import STILL, PlanningScene
 from ir_planner.timing import GRID_NS, GRID_S, standing
 from ir_values.arrays import FloatArray
@@ -275,7 +275,9 @@ class _Drive:
         for output in outputs:
             self._set(output)
 
-    def _events(self, driven: JointTrajectory, stages: Sequence[Sequence[Stage]]) -> list[_Event]:
+    def _events(
+        self, driven: JointTrajectory, stages: Sequence[Sequence[MotionPhase]]
+    ) -> list[_Event]:
         """What happens while a movement is driven."""
         found = []
         for one, parts in zip(self._through, stages, strict=True):
@@ -289,7 +291,7 @@ class _Drive:
         self,
         driven: JointTrajectory,
         command: Motion | SplineBlock,
-        stages: Sequence[Stage],
+        stages: Sequence[MotionPhase],
         triggered: Sequence[SetOutput],
     ) -> list[_Event]:
         """When the triggers of a motion act."""
@@ -363,7 +365,7 @@ class _Drive:
             if np.abs(end - self.here).max() < STILL:
                 self._at_once(triggered)
                 return
-            curve: Curve = AxisLine(self.here, end)
+            curve: AxisPath = AxisLine(self.here, end)
             drawn = None
         else:
             curve = tool_curve(motion, self.here, self.arm)
@@ -409,7 +411,7 @@ class _Drive:
         self._drive(curve, block, block.parts[0].speeds, drawn, triggered, least)
 
     def _timed_parts(
-        self, block: SplineBlock, curve: Curve, triggered: Sequence[SetOutput]
+        self, block: SplineBlock, curve: AxisPath, triggered: Sequence[SetOutput]
     ) -> None:
         """A block that begins and ends at rest and whose TIME_BLOCKs time some of its parts."""
         self.finish()
@@ -433,7 +435,7 @@ class _Drive:
         process = (block.place,) if self.working else ()
         self._step(driven, (block.place,), events, moves=True, tool=(None,), process=process)
 
-    def _least(self, block: SplineBlock, curve: Curve) -> float:
+    def _least(self, block: SplineBlock, curve: AxisPath) -> float:
         """Seconds that a block lasts at least: its TIME_BLOCK, and the parts outside as long as
         they take by themselves.
         """
@@ -457,7 +459,7 @@ class _Drive:
 
     def _drive(
         self,
-        curve: Curve,
+        curve: AxisPath,
         command: Motion | SplineBlock,
         speeds: Speeds,
         drawn: ToolMotion | None,

@@ -29,7 +29,7 @@ _JUMP = np.radians(20.0)  # of an axis between samples: the path passes a singul
 _DEGREE = 5
 
 
-class Curve(Protocol):
+class AxisPath(Protocol):
     """A path of the axes over s in [0, 1]."""
 
     @property
@@ -196,7 +196,7 @@ TORQUE = 0.98  # of the envelope: between samples it needs a little more
 class Move:
     """A curve and the law that drives it; target: where it leads what."""
 
-    curve: Curve
+    curve: AxisPath
     law: TimeLaw
     target: Target
 
@@ -230,7 +230,7 @@ class Move:
 
 
 def move(
-    curve: Curve,
+    curve: AxisPath,
     speeds: Speeds,
     scene: PlanningScene,
     target: Target,
@@ -269,7 +269,9 @@ def _axis_limits(speeds: Speeds, limits: MotionLimits) -> MotionLimits:
     return kept.for_speed(speeds.override)
 
 
-def _law_bounds(curve: Curve, speeds: Speeds, limits: MotionLimits) -> tuple[float, float, float]:
+def _law_bounds(
+    curve: AxisPath, speeds: Speeds, limits: MotionLimits
+) -> tuple[float, float, float]:
     """Bounds of s' [1/s], s'' and s''' before the axes are looked at along the path."""
     _, first, _, _ = curve.at(np.linspace(0.0, 1.0, 65))
     rate = np.maximum(np.abs(first).max(axis=0), STILL)

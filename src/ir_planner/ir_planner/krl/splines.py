@@ -221,7 +221,7 @@ def timed_block(
 
 
 @dataclass(frozen=True)
-class Stretch:
+class TimeBlockSpan:
     """What lies between two marks of a TIME_BLOCK lasts from `begin` to `end` [s] by itself, and
     `longer` [s] than that by what is asked.
     """
@@ -231,7 +231,7 @@ class Stretch:
     longer: float
 
 
-def stretches(block: SplineBlock, passed: FloatArray, override: float) -> list[Stretch]:
+def stretches(block: SplineBlock, passed: FloatArray, override: float) -> list[TimeBlockSpan]:
     """Of all TIME_BLOCKs, where parts end at `passed` (parts + 1,) [s], 0 first, without them; what
     would have to be faster has a `longer` below 0. Raises KrlMotionError.
     """
@@ -242,12 +242,12 @@ def stretches(block: SplineBlock, passed: FloatArray, override: float) -> list[S
         for (a, b), share in zip(itertools.pairwise(marks), _shares(one), strict=True):
             own = passed[b] - passed[a]
             longer = share * seconds - own
-            found.append(Stretch(float(passed[a]), float(passed[b]), float(longer)))
+            found.append(TimeBlockSpan(float(passed[a]), float(passed[b]), float(longer)))
     return found
 
 
 def stretched(
-    driven: JointTrajectory, slowed: Sequence[Stretch], passed: FloatArray
+    driven: JointTrajectory, slowed: Sequence[TimeBlockSpan], passed: FloatArray
 ) -> tuple[JointTrajectory, FloatArray]:
     """A movement that lasts longer in each stretch, and when it passes what it passed at `passed`
     (P,) [s].
@@ -275,7 +275,7 @@ def stretched(
 
 
 def _slow(
-    times: FloatArray, slowed: Sequence[Stretch]
+    times: FloatArray, slowed: Sequence[TimeBlockSpan]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Instants [s] of the stretched movement for `times` [s] of its own, and their first and second
     derivatives.

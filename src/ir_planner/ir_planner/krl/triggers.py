@@ -26,7 +26,7 @@ _SAME = 0.5 * GRID_S  # s
 
 
 @dataclass(frozen=True)
-class Stage:
+class MotionPhase:
     """A motion of a movement, or a part of a spline, in seconds from the start of the movement:
     `free` of the corner before, the `corner` at its end begins, it `ends`; earliest, latest: how
     far a PATH leads.
@@ -60,7 +60,7 @@ Shifted = Callable[[float, float], float]
 """The instant [s] at which the tool is a distance [m] of its path after where it is at another."""
 
 
-def instant(switch: Switch, stage: Stage, shifted: Shifted) -> tuple[float, bool]:
+def instant(switch: Switch, stage: MotionPhase, shifted: Shifted) -> tuple[float, bool]:
     """When a trigger acts [s], and whether that is a limit that it would lead beyond."""
     first, last = stage.limits(switch)
     at = stage.reference(switch)
@@ -71,7 +71,7 @@ def instant(switch: Switch, stage: Stage, shifted: Shifted) -> tuple[float, bool
     return acts + switch.waited, abs(acts - at) > _SAME
 
 
-def stages_of(moves: Sequence[Move], overlaps: Sequence[int]) -> list[tuple[Stage, ...]]:
+def stages_of(moves: Sequence[Move], overlaps: Sequence[int]) -> list[tuple[MotionPhase, ...]]:
     """The stages of each motion that is driven through, one for each part of a spline."""
     lasting = [one.law.total for one in moves]
     begins = [0, *itertools.accumulate(a - b for a, b in zip(lasting[:-1], overlaps, strict=True))]
@@ -88,7 +88,7 @@ def stages_of(moves: Sequence[Move], overlaps: Sequence[int]) -> list[tuple[Stag
     return found
 
 
-def stages_at(times: FloatArray) -> tuple[Stage, ...]:
+def stages_at(times: FloatArray) -> tuple[MotionPhase, ...]:
     """The stages of a spline that passes its points at these times (parts + 1,) s."""
     first, *passed = times / GRID_S
     return _parts(passed, first, passed[-1], first, passed[-1])
@@ -96,12 +96,12 @@ def stages_at(times: FloatArray) -> tuple[Stage, ...]:
 
 def _parts(
     passed: Sequence[float], free: float, corner: float, earliest: float, latest: float
-) -> tuple[Stage, ...]:
+) -> tuple[MotionPhase, ...]:
     """Stages of parts that end at grid steps (parts,)."""
     starts = [free, *passed[:-1]]
     rounding = [*passed[:-1], corner]
     return tuple(
-        Stage(*(GRID_S * float(one) for one in (start, corner_of, end, earliest, latest)))
+        MotionPhase(*(GRID_S * float(one) for one in (start, corner_of, end, earliest, latest)))
         for start, corner_of, end in zip(starts, rounding, passed, strict=True)
     )
 

@@ -50,8 +50,8 @@ from ir_planner.node.inputs import LastState, has_joints, measured_velocity, of_
 from ir_planner.node.moveit_actions import (
     EXECUTE,
     MOVE,
-    Executor,
     MoveAction,
+    TrajectoryExecution,
     other_controller,
 )
 from ir_planner.node.moveit_monitor import SceneMonitor
@@ -396,7 +396,7 @@ class MoveItNode(Node):
         )
         plans = MutuallyExclusiveCallbackGroup()
         questions = MutuallyExclusiveCallbackGroup()
-        self._executor = Executor(self._drive)
+        self._executor = TrajectoryExecution(self._drive)
         apply = self._guarded(SERVICES["ApplyPlanningScene"], answers.apply_scene)
         self._monitor = SceneMonitor(
             self,

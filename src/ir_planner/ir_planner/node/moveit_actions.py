@@ -34,7 +34,7 @@ def follow_goal() -> Any:
         ) from error
 
 
-class Executor:
+class TrajectoryExecution:
     """Lets the controller drive a trajectory.
 
     send: sends a goal and waits for its result; the second argument says when it is canceled.
@@ -83,7 +83,7 @@ class MoveAction:
 
     plan: Callable[[Any, Any], Status]
     new: Callable[[], tuple[Any, Any]]
-    executor: Executor
+    executor: TrajectoryExecution
 
     def run(self, goal: Any, result: Any, canceled: Canceled, feedback: Feedback) -> Status:
         """Plan, and where it is asked for, execute from where the robot is."""

@@ -18,7 +18,7 @@ from ir_msgs_py.names import BASE_FRAME, WORLD_FRAME
 from ir_msgs_py.ros.conversions import pose_from_msg
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
-from ir_planner.node.moveit_view import Piece, allowed_here, allowed_in, objects_of
+from ir_planner.node.moveit_view import MoveItShape, allowed_here, allowed_in, objects_of
 from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError, PoseError, shown
 
@@ -148,7 +148,7 @@ def _is_planning_frame(msg: Any) -> bool:
     return (at.x, at.y, at.z) == (0.0, 0.0, 0.0) and (q.x, q.y, q.z) == (0.0, 0.0, 0.0)
 
 
-def _repeats(msg: Any, published: Sequence[Piece], cell: Cell) -> bool:
+def _repeats(msg: Any, published: Sequence[MoveItShape], cell: Cell) -> bool:
     """Whether a collision object is one that was published, as it was."""
     operation = msg.operation[0] if isinstance(msg.operation, bytes) else int(msg.operation)
     if operation != _ADD or msg.planes or msg.subframe_names:
@@ -157,14 +157,16 @@ def _repeats(msg: Any, published: Sequence[Piece], cell: Cell) -> bool:
     at = composed(frame_pose(msg.header.frame_id, cell, what), pose_in(msg.pose, what))
     kinds = {number: word for number, (word, _) in _PRIMITIVES.items()}
     given = [
-        Piece(kinds.get(int(shape.type), ""), composed(at, pose_in(place, what)), shape.dimensions)
+        MoveItShape(
+            kinds.get(int(shape.type), ""), composed(at, pose_in(place, what)), shape.dimensions
+        )
         for shape, place in zip(msg.primitives, msg.primitive_poses, strict=False)
     ]
     for mesh, place in zip(msg.meshes, msg.mesh_poses, strict=False):
         corners = np.array([(v.x, v.y, v.z) for v in mesh.vertices], float).reshape(-1, 3)
         if not len(corners):
             return False
-        given.append(Piece("mesh", composed(at, pose_in(place, what)), corners=corners))
+        given.append(MoveItShape("mesh", composed(at, pose_in(place, what)), corners=corners))
     left = list(published)
     for piece in given:
         same = next((one for one in left if one.agrees(piece)), None)

@@ -32,7 +32,7 @@ _PRIMITIVES = {
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class MoveItShape:
     """A shape in the cell: what MoveIt calls a solid primitive, or a mesh (corners (V, 3) [m])."""
 
     kind: str
@@ -40,7 +40,7 @@ class Piece:
     dimensions: tuple[float, ...] = ()
     corners: FloatArray | None = None
 
-    def agrees(self, other: Piece, within: float = 1e-5) -> bool:
+    def agrees(self, other: MoveItShape, within: float = 1e-5) -> bool:
         """Whether the other is the same shape at the same place, within some [m]."""
         if self.kind != other.kind:
             return False
@@ -63,26 +63,28 @@ def _placed(points: FloatArray, pose: FloatArray) -> FloatArray:
     return placed
 
 
-def pieces_of(body: Body) -> list[Piece]:
+def pieces_of(body: Body) -> list[MoveItShape]:
     """A body in the cell as MoveIt's shapes: it has neither capsules nor planes that are drawn."""
     pose = body.pose
     radius = float(body.size[0])
     length = float(body.size[1])
     if body.kind == "capsule":
         ends = [_lifted(pose, side * 0.5 * length) for side in (-1.0, 1.0)]
-        balls = [Piece("sphere", end, (radius,)) for end in ends]
-        return [Piece("cylinder", pose, (length, radius)), *balls] if length > 0.0 else balls[:1]
+        balls = [MoveItShape("sphere", end, (radius,)) for end in ends]
+        return (
+            [MoveItShape("cylinder", pose, (length, radius)), *balls] if length > 0.0 else balls[:1]
+        )
     if body.kind == "plane":
         slab = _lifted(pose, -0.5 * _FLOOR_THICK)
-        return [Piece("box", slab, (_FLOOR_EDGE, _FLOOR_EDGE, _FLOOR_THICK))]
+        return [MoveItShape("box", slab, (_FLOOR_EDGE, _FLOOR_EDGE, _FLOOR_THICK))]
     if body.kind == "mesh":
-        return [Piece("mesh", pose, corners=np.asarray(body.vertices))]
+        return [MoveItShape("mesh", pose, corners=np.asarray(body.vertices))]
     sizes = {
         "box": tuple(map(float, body.size)),
         "sphere": (radius,),
         "cylinder": (length, radius),  # height first
     }
-    return [Piece(body.kind, pose, sizes[body.kind])]
+    return [MoveItShape(body.kind, pose, sizes[body.kind])]
 
 
 def _lifted(pose: FloatArray, height: float) -> FloatArray:
@@ -92,9 +94,9 @@ def _lifted(pose: FloatArray, height: float) -> FloatArray:
     return lifted
 
 
-def objects_of(cell: Cell) -> dict[str, list[Piece]]:
+def objects_of(cell: Cell) -> dict[str, list[MoveItShape]]:
     """What the cell holds before its program begins, by name: machines, parts that lie, floor."""
-    found: dict[str, list[Piece]] = {}
+    found: dict[str, list[MoveItShape]] = {}
     machines = {m.name: m.world_bodies() for m in cell.equipment}
     lying = {
         name: cell.part(name).lying(cell.station(station).pose)
@@ -206,7 +208,7 @@ def allowed_here(cell: Cell) -> set[frozenset[str]]:
     return {frozenset(pair) for pair in combinations(links, 2)} - checked
 
 
-def _object(msgs: Any, name: str, pieces: Iterable[Piece]) -> Any:
+def _object(msgs: Any, name: str, pieces: Iterable[MoveItShape]) -> Any:
     made = msgs.CollisionObject(id=name, operation=msgs.CollisionObject.ADD)
     made.header.frame_id = WORLD_FRAME
     made.pose.orientation.w = 1.0

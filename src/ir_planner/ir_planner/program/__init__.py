@@ -30,8 +30,15 @@ from ir_planner.program.request import (
 )
 from ir_planner.program.savings import common_program
 from ir_planner.program.spreads import Spreads, with_intervals
-from ir_planner.program.standby import Lengths, Standby, Timeouts, Trip, best_posture, lengths_of
-from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Chain, Part
+from ir_planner.program.standby import (
+    PauseLengths,
+    Standby,
+    Timeouts,
+    Trip,
+    best_posture,
+    lengths_of,
+)
+from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, HopPart, StationChain
 from ir_planner.program.steps import (
     Doors,
     PlacedStep,
@@ -52,17 +59,16 @@ __all__ = [
     "ENTER",
     "LEAVE",
     "MOTORS",
-    "Chain",
     "Charge",
     "Choice",
     "Doors",
+    "HopPart",
     "Ladder",
-    "Lengths",
     "Movements",
     "Node",
     "Outlook",
-    "Part",
     "Pause",
+    "PauseLengths",
     "PlacedStep",
     "Point",
     "ProgramPlan",
@@ -74,6 +80,7 @@ __all__ = [
     "Spreads",
     "StageError",
     "Standby",
+    "StationChain",
     "Steps",
     "TimeValues",
     "Timeouts",

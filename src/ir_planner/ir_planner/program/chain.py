@@ -15,10 +15,10 @@ from ir_planner.program.station_graph import (
     ACROSS,
     ENTER,
     LEAVE,
-    Chain,
     Hop,
-    Part,
+    HopPart,
     Settled,
+    StationChain,
     StationGraph,
 )
 from ir_planner.program.steps import Route
@@ -35,7 +35,7 @@ from ir_values.arrays import FloatArray
 # obstacles less its margin, then the cost of the movement that the planner finds. By W of eq. (9)
 # it is the straight segment, and exact where that is free; else the path found.
 
-Turned = Part | tuple[int, str, bytes]  # what parts that cost the same have in common
+Turned = HopPart | tuple[int, str, bytes]  # what parts that cost the same have in common
 
 
 class CostEdges:
@@ -50,7 +50,7 @@ class CostEdges:
             CoarseCost(movements.context.inside(route.arriving(hop)), self.rates)
             for hop in range(len(route))
         ]
-        self._looked_at: set[Part] = set()
+        self._looked_at: set[HopPart] = set()
         self._costs: dict[Turned, float] = {}
         self._coarse_found: dict[tuple[int, bytes, bytes], float] = {}
 
@@ -74,13 +74,13 @@ class CostEdges:
 
         bounds = Hop(lines(first, entry=False), across, lines(second, entry=True))
         paths = [
-            Part(hop, ENTER, -1, k) for k, node in enumerate(second) if node.driven is not None
+            HopPart(hop, ENTER, -1, k) for k, node in enumerate(second) if node.driven is not None
         ]
         for part, settled in zip(paths, self._planned(paths), strict=True):
             bounds.take(part, settled)
         return _with_standing_parts(bounds, first, second)
 
-    def settle(self, parts: list[Part]) -> list[Settled]:
+    def settle(self, parts: list[HopPart]) -> list[Settled]:
         """Coarse solutions of the parts that have none yet; where all have, the movements: those
         along service lines first.
         """
@@ -96,13 +96,13 @@ class CostEdges:
             self._coarse(part) if part in fresh else Settled(0.0, exact=False) for part in parts
         ]
 
-    def _hurried(self, parts: list[Part]) -> list[Settled]:
+    def _hurried(self, parts: list[HopPart]) -> list[Settled]:
         """Where time or work have ended: a straight segment that isn't free is none; the others are
         planned when all are free. Looking whether they are free needs no work left.
         """
         route = self.movements.route
         context = self.movements.context
-        blocked: list[Part] = []
+        blocked: list[HopPart] = []
         for part in parts:
             if part.kind == ACROSS:
                 first, second = self.movements.ends(part)
@@ -119,7 +119,7 @@ class CostEdges:
             Settled(np.inf if part in blocked else 0.0, exact=part in blocked) for part in parts
         ]
 
-    def _coarse(self, part: Part) -> Settled:
+    def _coarse(self, part: HopPart) -> Settled:
         self.movements.context.work.check()
         first, second = self.movements.ends(part)
         turned = part.hop, _turned(first), np.round(second - first, 6).tobytes()
@@ -127,7 +127,7 @@ class CostEdges:
             self._coarse_found[turned] = self._coarse_costs[part.hop].between(first, second)
         return Settled(self._coarse_found[turned] * (1.0 - MARGIN), exact=False, proved=False)
 
-    def _planned(self, parts: list[Part]) -> list[Settled]:
+    def _planned(self, parts: list[HopPart]) -> list[Settled]:
         """Costs of the movements; a service line that is another one turned costs what that one
         does.
         """
@@ -141,7 +141,7 @@ class CostEdges:
             )
         return [Settled(self._costs[key], exact=True) for key in turned]
 
-    def _turned(self, part: Part) -> Turned:
+    def _turned(self, part: HopPart) -> Turned:
         """The same for service lines that differ by whole turns of joints: nothing of a cost
         depends on them.
         """
@@ -163,7 +163,7 @@ class TravelEdges:
             FreeSpace.of(route.arriving(hop), context.safety_distance, context.work)
             for hop in range(len(route))
         ]
-        self._blocked: set[Part] = set()
+        self._blocked: set[HopPart] = set()
 
     def hops(self) -> list[Hop]:
         """All hops with W of the straight segments and of the service lines' points."""
@@ -180,7 +180,7 @@ class TravelEdges:
         across = movement_cost(weights, _departures(first)[:, None], _arrivals(second)[None])
         return _with_standing_parts(Hop(leave, across, enter), first, second)
 
-    def settle(self, parts: list[Part]) -> list[Settled]:
+    def settle(self, parts: list[HopPart]) -> list[Settled]:
         """W of straight segments where they are free, which is exact; else, asked again, and of
         service lines W of the movement.
         """
@@ -192,7 +192,7 @@ class TravelEdges:
             straight.get(part) or found.get(part) or Settled(0.0, exact=False) for part in parts
         ]
 
-    def _straight(self, part: Part) -> Settled:
+    def _straight(self, part: HopPart) -> Settled:
         first, second = self.movements.ends(part)
         cone = self.movements.asking(part, self.movements.context).cone
         space = replace(self._spaces[part.hop], cone=cone)
@@ -202,7 +202,7 @@ class TravelEdges:
         weights = self.movements.route.arriving(part.hop).weights
         return Settled(float(movement_cost(weights, first, second)), exact=bool(free))
 
-    def _planned(self, parts: list[Part]) -> list[Settled]:
+    def _planned(self, parts: list[HopPart]) -> list[Settled]:
         """W of the movements as they are sent: a path that was found is shortened by its
         descent.
         """
@@ -285,7 +285,7 @@ def layers_of(
     return layers
 
 
-def cheapest_chain(movements: Movements, improvement: int, progress: Progress) -> Chain:
+def cheapest_chain(movements: Movements, improvement: int, progress: Progress) -> StationChain:
     """The cheapest chain by the objective. improvement: work of each movement for better answers.
 
     Raises StageError where none connects the stops.
@@ -293,7 +293,7 @@ def cheapest_chain(movements: Movements, improvement: int, progress: Progress) -
     context = movements.context
     count = len(movements.route)
     if not count:
-        return Chain([0], 0.0, 0.0, 0.0)
+        return StationChain([0], 0.0, 0.0, 0.0)
     travel = context.options.objective == "movement_cost"
     edges = (TravelEdges if travel else CostEdges)(movements, improvement)
 
@@ -332,7 +332,7 @@ def cheapest_chain(movements: Movements, improvement: int, progress: Progress) -
     return chain
 
 
-def parts_of(chain: Chain, movements: Movements) -> list[list[Part]]:
+def parts_of(chain: StationChain, movements: Movements) -> list[list[HopPart]]:
     """The parts of every hop along a chain that move."""
     result = []
     for hop in range(len(movements.route)):
@@ -341,9 +341,9 @@ def parts_of(chain: Chain, movements: Movements) -> list[list[Part]]:
         a = movements.layers[hop][first]
         b = movements.layers[hop + 1][second]
         parts = [
-            (Part(hop, LEAVE, first, -1), a.leaves),
-            (Part(hop, ACROSS, first, second), not _same(a.departure, b.arrival)),
-            (Part(hop, ENTER, -1, second), b.enters),
+            (HopPart(hop, LEAVE, first, -1), a.leaves),
+            (HopPart(hop, ACROSS, first, second), not _same(a.departure, b.arrival)),
+            (HopPart(hop, ENTER, -1, second), b.enters),
         ]
         result.append([part for part, moves in parts if moves])
     return result

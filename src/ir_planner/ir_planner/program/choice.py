@@ -12,7 +12,7 @@ from ir_planner.program.chain import parts_of
 from ir_planner.program.movements import Failure, Movements
 from ir_planner.program.pauses import AUTO, Charge, Pause, pause_by_itself, planned_pause
 from ir_planner.program.request import ProgramRequest, Progress, StageError
-from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Chain, Part
+from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, HopPart, StationChain
 from ir_planner.program.steps import PlacedStep, Route, Scenes, signal_text
 from ir_planner.program.time_values import Ladder
 from ir_planner.scene import PlanningScene
@@ -134,7 +134,7 @@ def energies_only(
     return replace(step, report=report)
 
 
-def legs_of(route: Route, hops: list[list[Part]], movements: Mapping[Part, Movement]) -> Legs:
+def legs_of(route: Route, hops: list[list[HopPart]], movements: Mapping[HopPart, Movement]) -> Legs:
     """The legs of a route from the movements of its parts, hop by hop."""
     return {
         step: Leg(
@@ -147,7 +147,7 @@ def legs_of(route: Route, hops: list[list[Part]], movements: Mapping[Part, Movem
     }
 
 
-def _kind_of(part: Part, route: Route) -> MovementKind:
+def _kind_of(part: HopPart, route: Route) -> MovementKind:
     along = part.kind == ENTER and route.at(part.hop).step.kind == "PATH"
     return MovementKind.CARTESIAN if along else _KINDS[part.kind]
 
@@ -226,7 +226,7 @@ def _moves(leg: Leg, charge: Charge, complete: Complete) -> list[PlannedMovement
 
 _NO_WAIT = 1e-3  # s: durations are whole nanoseconds, stretched by millionths
 Steps = tuple[PlannedMovement, ...]
-Found = Mapping[Part, Movement]
+Found = Mapping[HopPart, Movement]
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,7 +235,7 @@ class Choice:
 
     request: ProgramRequest
     ladder: Ladder
-    chain: Chain
+    chain: StationChain
 
     @cached_property
     def _reliance(self) -> Reliance:
@@ -247,18 +247,18 @@ class Choice:
         return self.ladder.own
 
     @property
-    def parts(self) -> list[Part]:
+    def parts(self) -> list[HopPart]:
         """The parts of the chain that move, in order."""
         return [part for hop in parts_of(self.chain, self.movements) for part in hop]
 
-    def along(self, chain: Chain) -> "Choice":
+    def along(self, chain: StationChain) -> "Choice":
         """The same with another chain."""
         return replace(self, chain=chain)
 
-    def found(self, progress: Progress) -> dict[Part, Movement]:
+    def found(self, progress: Progress) -> dict[HopPart, Movement]:
         """The movements of all parts. Raises StageError where one of them isn't found."""
         movements = self.movements
-        result = dict[Part, Movement]()
+        result = dict[HopPart, Movement]()
         journal = movements.context.journal
         with journal.stage("movements") as notes:
             for hop, parts in enumerate(parts_of(self.chain, movements)):

@@ -12,7 +12,7 @@ from ir_planner.program.chain import cheapest_chain
 from ir_planner.program.choice import Choice, Found, Steps
 from ir_planner.program.movements import rates_of
 from ir_planner.program.request import Progress, StageError
-from ir_planner.program.station_graph import Chain, Part
+from ir_planner.program.station_graph import HopPart, StationChain
 from ir_planner.program.time_values import FASTEST, Point, SlowDown, TimeValues, slow_downs
 from ir_planner.request import DURATION_MAX
 from ir_planner.timing import Movement
@@ -35,7 +35,7 @@ SHORTEST_WAIT = (
 class Timed:
     """A movement for every part, how long to wait at the end [s], and the joules at the mains."""
 
-    movements: dict[Part, Movement]
+    movements: dict[HopPart, Movement]
     wait: float
     energy: float
 
@@ -61,7 +61,7 @@ def shared_out(values: TimeValues, task: Task) -> Timed | None:
     if left < 0.0:
         return None
     steps = slow_downs(fronts)
-    too_long: dict[Part, SlowDown] = {}  # the first step of a part that doesn't fit, and ends it
+    too_long: dict[HopPart, SlowDown] = {}  # the first step of a part that doesn't fit, and ends it
     found = _filled(chosen, left, steps, task)
     for k, step in enumerate(steps):
         if step.part in too_long:
@@ -85,7 +85,7 @@ def _to_slow(point: Point) -> tuple[bool, float]:
 
 
 def _filled(
-    chosen: dict[Part, Point], left: float, open_steps: list[SlowDown], task: Task
+    chosen: dict[HopPart, Point], left: float, open_steps: list[SlowDown], task: Task
 ) -> list[Timed]:
     """Programs of these points: one that waits at the end, and one in which a part takes the time
     left.
@@ -268,7 +268,7 @@ class _Tried:
         """Of the program [J]."""
         return np.inf if self.timed is None else self.timed.energy
 
-    def bound(self, chain: Chain, value: float, seconds: float) -> float:
+    def bound(self, chain: StationChain, value: float, seconds: float) -> float:
         """Least energy [J] in a cycle, by the bound of the cheapest chain at a value; movements of
         other values that are cheaper at this one show that the bound is too high.
         """

@@ -14,7 +14,7 @@ from ir_planner.errors import RequestError
 from ir_planner.program.chain import cheapest_chain, layers_of
 from ir_planner.program.choice import Choice, Found, Steps
 from ir_planner.program.cycle_plan import cycle_gap, free_gap, timed_choice
-from ir_planner.program.movements import Movements, Near, cost_of, rates_of
+from ir_planner.program.movements import Movements, WarmStarts, cost_of, rates_of
 from ir_planner.program.request import ProgramRequest, Progress, StageError
 from ir_planner.program.station_graph import ACROSS
 from ir_planner.program.steps import Route
@@ -32,7 +32,7 @@ _HALF = 0.5  # of what is left: for the chain again; the rest is for its movemen
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class ChainAnswer:
     """A program along a chain. standing: seconds of the pauses in it; gap [%]: as in the answer."""
 
     choice: Choice
@@ -57,7 +57,7 @@ class Answer:
 
 def best_answer(
     request: ProgramRequest, route: Route, context: Context, progress: Progress
-) -> Answer:
+) -> ChainAnswer:
     """The best program that the work of a request buys. The synchronous one is a candidate of an
     asynchronous request too, unless that names a planner and isn't for the fastest.
 
@@ -81,7 +81,9 @@ def best_answer(
     return common
 
 
-def _best(request: ProgramRequest, route: Route, context: Context, progress: Progress) -> Answer:
+def _best(
+    request: ProgramRequest, route: Route, context: Context, progress: Progress
+) -> ChainAnswer:
     """The best program of synchronous, or of asynchronous movements."""
     work = context.work
     with _limited(work, work.left, min(work.improvement, _FIRST)):
@@ -98,7 +100,9 @@ def _best(request: ProgramRequest, route: Route, context: Context, progress: Pro
         return best if request.cycle_time > 0.0 else _with_better_movements(best, progress)
 
 
-def _first(request: ProgramRequest, route: Route, context: Context, progress: Progress) -> Answer:
+def _first(
+    request: ProgramRequest, route: Route, context: Context, progress: Progress
+) -> ChainAnswer:
     """The first program. A cycle time that is too short along the cheapest chain may do along that
     of the
     fastest program: what one objective can do is refused by none.
@@ -123,14 +127,16 @@ def chosen(request: ProgramRequest, route: Route, context: Context, progress: Pr
     layers = layers_of(route, request.start, context, exits, progress, settings.interaction)
     near = None
     if context.options.objective == "time":  # the fastest lines are found from slower ones
-        near = Near(scaling=Movements(route, layers, context.asking("time_and_energy"), searches))
+        near = WarmStarts(
+            scaling=Movements(route, layers, context.asking("time_and_energy"), searches)
+        )
     movements = Movements(route, layers, context, searches, near)
     improvement = min(settings.improvement_iterations, _CHOOSING)
     chain = cheapest_chain(movements, improvement, progress)
     return Choice(request, Ladder(movements, improvement), chain)
 
 
-def planned(choice: Choice, progress: Progress) -> Answer:
+def planned(choice: Choice, progress: Progress) -> ChainAnswer:
     """The program along a chain, within the cycle time of its request."""
     cycle = choice.request.cycle_time
     found: Found = choice.found(progress)
@@ -139,14 +145,14 @@ def planned(choice: Choice, progress: Progress) -> Answer:
     standing = choice.standing(found)
     steps = choice.steps(found)
     if cycle <= 0.0 or not choice.parts:
-        return Answer(choice, steps, standing, free_gap(choice, found, steps))
+        return ChainAnswer(choice, steps, standing, free_gap(choice, found, steps))
     timed = timed_choice(choice, cycle, standing, progress)
     pauses = [step for step in timed.steps if step.is_pause][: sum(step.is_pause for step in steps)]
     spent = sum(step.report.energy for step in timed.steps) - sum(
         pause.report.energy for pause in pauses
     )
     gap = cycle_gap(timed.choice, len(timed.timed.movements), spent, timed.bound)
-    return Answer(choice, timed.steps, standing, gap)
+    return ChainAnswer(choice, timed.steps, standing, gap)
 
 
 def _fastest(choice: Choice, found: Found) -> Found:
@@ -163,7 +169,7 @@ def _fastest(choice: Choice, found: Found) -> Found:
 
 def _again(
     request: ProgramRequest, route: Route, context: Context, progress: Progress, improvement: int
-) -> Answer | None:
+) -> ChainAnswer | None:
     """The program along a chain chosen with more effort; None where that isn't done with half of
     what is left.
     """
@@ -176,7 +182,7 @@ def _again(
         return None if work.exhausted else answer
 
 
-def _with_better_movements(best: Answer, progress: Progress) -> Answer:
+def _with_better_movements(best: ChainAnswer, progress: Progress) -> ChainAnswer:
     """The program with its regional movements planned again, with more work at every turn."""
     movements = best.choice.movements
     work = best.choice.movements.context.work

@@ -14,7 +14,7 @@ from ir_planner import optimize
 from ir_planner.checks import Consumption, tilt_violation
 from ir_planner.errors import RequestError, TimingError
 from ir_planner.program.bounds import Rates
-from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, Part
+from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, HopPart
 from ir_planner.program.steps import Route
 from ir_planner.program.stops import Node
 from ir_planner.regional import Searches, search_regional
@@ -125,21 +125,21 @@ class Failure:
     status: Status
 
 
-class Known(Protocol):
+class MovementSource(Protocol):
     """Movements that were found before."""
 
-    def movement(self, part: Part) -> Movement | None:
+    def movement(self, part: HopPart) -> Movement | None:
         """The movement of a part that was planned; None where none was found."""
 
 
 @dataclass(frozen=True, eq=False)
-class Near:
+class WarmStarts:
     """Known movements from which others are made, instead of searched: across, by descent from the
     best of those of `across`; along service lines, those of `lines` slowed down, or by descent from
     those of `scaling`. Those of them that can plan do so first.
     """
 
-    across: tuple[Known, ...] = ()
+    across: tuple[MovementSource, ...] = ()
     lines: tuple["Movements", ...] = ()
     scaling: "Movements | None" = None
 
@@ -155,7 +155,7 @@ class Movements:
         layers: list[list[Node]],
         context: Context,
         searches: Searches,
-        near: Near | None = None,
+        near: WarmStarts | None = None,
     ) -> None:
         self.route = route
         self.layers = layers
@@ -163,7 +163,7 @@ class Movements:
         self.searches = searches
         # whether movements may be made from known ones by descent
         self.descends = context.options.planner_id == "" and context.options.timing == "synchronous"
-        self._near = near if near is not None and self.descends else Near()
+        self._near = near if near is not None and self.descends else WarmStarts()
         self._found: dict[Key, Movement | Failure] = {}
         self._logs: dict[Key, list[SearchLog]] = {}
         self.unreachable = Status(
@@ -175,7 +175,7 @@ class Movements:
         """How many movements were planned."""
         return len(self._found)
 
-    def plan(self, parts: Sequence[Part], improvement: int) -> list[Movement | Failure]:
+    def plan(self, parts: Sequence[HopPart], improvement: int) -> list[Movement | Failure]:
         """The movements of parts of hops; those that aren't known yet side by side."""
         new = {key: part for part in parts if (key := self._key(part)) not in self._found}
         near = self._near
@@ -191,7 +191,7 @@ class Movements:
                 self.unreachable = found.status
         return [self._found[self._key(part)] for part in parts]
 
-    def _shared(self, parts: list[Part], improvement: int) -> list[Movement | Failure]:
+    def _shared(self, parts: list[HopPart], improvement: int) -> list[Movement | Failure]:
         """Movements of parts that share the work left: all the same, but those along service lines,
         which are known without any, no more than if the whole program was still to plan. What isn't
         found with its
@@ -210,16 +210,16 @@ class Movements:
                 planned[k] = mapped(self._planned, [parts[k]], self.context, improving, [left])[0]
         return planned
 
-    def movement(self, part: Part) -> Movement | None:
+    def movement(self, part: HopPart) -> Movement | None:
         """The movement of a part that was planned; None where none was found."""
         found = self._found[self._key(part)]
         return found if isinstance(found, Movement) else None
 
-    def logs(self, part: Part) -> list[SearchLog]:
+    def logs(self, part: HopPart) -> list[SearchLog]:
         """What the search for the movement of a part did, where it keeps a log."""
         return self._logs.get(self._key(part), [])
 
-    def better(self, parts: Sequence[Part], improvement: int) -> None:
+    def better(self, parts: Sequence[HopPart], improvement: int) -> None:
         """Plan parts again with more work, and keep what is cheaper."""
         rates = rates_of(self.context)
         known = {key: self._found.pop(key) for key in dict.fromkeys(map(self._key, parts))}
@@ -233,7 +233,7 @@ class Movements:
             ):
                 self._found[key] = before
 
-    def _key(self, part: Part) -> Key:
+    def _key(self, part: HopPart) -> Key:
         """What two parts that are the same movement have in common."""
         first, second = self.nodes(part)
         names = self.route.name(part.hop - 1), self.route.name(part.hop)
@@ -245,11 +245,11 @@ class Movements:
         kind = part.kind if part.kind != ACROSS else f"{part.kind} {self._planner(part)} {step.via}"
         return id(self.route.arriving(part.hop)), kind, names, ends
 
-    def _planner(self, part: Part) -> str:
+    def _planner(self, part: HopPart) -> str:
         """The search that a regional movement is asked for by its step, else by the request."""
         return self.route.at(part.hop).step.planner or self.context.options.planner_id
 
-    def nodes(self, part: Part) -> tuple[Node, Node]:
+    def nodes(self, part: HopPart) -> tuple[Node, Node]:
         """The configurations of a part; the same twice where it is a service movement."""
         layers = self.layers
         first = (
@@ -260,7 +260,7 @@ class Movements:
         second = layers[part.hop + 1][part.second] if part.kind != LEAVE else first
         return first, second
 
-    def ends(self, part: Part) -> tuple[FloatArray, FloatArray]:
+    def ends(self, part: HopPart) -> tuple[FloatArray, FloatArray]:
         """Where a part starts and ends (n,)."""
         first, second = self.nodes(part)
         if part.kind == ACROSS:
@@ -269,18 +269,18 @@ class Movements:
             return first.interaction, first.departure
         return first.arrival, first.interaction
 
-    def asking(self, part: Part, context: Context) -> Context:
+    def asking(self, part: HopPart, context: Context) -> Context:
         """A context with what the movement of a part has to keep: its scene, and how far the tool
         may lean.
         """
         inside = context.inside(self.route.arriving(part.hop))
         return inside.leaning_by(self.route.tilt(part.hop)).upright_from(self.ends(part)[0])
 
-    def _planned(self, part: Part, context: Context) -> Movement | Failure:
+    def _planned(self, part: HopPart, context: Context) -> Movement | Failure:
         inside = self.asking(part, context)
         return self._across(part, inside) if part.kind == ACROSS else self._along_line(part, inside)
 
-    def _across(self, part: Part, context: Context) -> Movement | Failure:
+    def _across(self, part: HopPart, context: Context) -> Movement | Failure:
         known = _known(self._near.across, part)
         asked = context.planned_by(self._planner(part))
         via = self.route.at(part.hop).step.via
@@ -301,7 +301,7 @@ class Movements:
         return found or Failure(Status(status.code, f"{what}: {status.message}"))
 
     def _past_places(
-        self, part: Part, via: StepVia, context: Context
+        self, part: HopPart, via: StepVia, context: Context
     ) -> tuple[Status, Movement | None]:
         """The movement past the places of a step; each leg gets the same share of the work."""
         first, second = self.ends(part)
@@ -322,7 +322,7 @@ class Movements:
         except RequestError as error:  # none of what was found is certified
             return error.status, None
 
-    def _along_line(self, part: Part, context: Context) -> Movement | Failure:
+    def _along_line(self, part: HopPart, context: Context) -> Movement | Failure:
         entry = part.kind == ENTER
         station = self.route.name(part.hop if entry else part.hop - 1)
         driven = self.nodes(part)[0].driven
@@ -353,6 +353,6 @@ class Movements:
         return same if same is not None and same.cost < found.cost else found
 
 
-def _known(those: Sequence[Known | None], part: Part) -> list[Movement]:
+def _known(those: Sequence[MovementSource | None], part: HopPart) -> list[Movement]:
     """The movements of a part among those that were planned."""
     return [known for one in those if one is not None and (known := one.movement(part)) is not None]

@@ -85,7 +85,7 @@ class Recharge:
 
 
 @dataclass(frozen=True)
-class Step:
+class RestStep:
     """A mode that is asked for at a time [s] from the start of the pause, if the pause is still on
     then.
     """
@@ -99,7 +99,7 @@ class Step:
         return self.at + self.rest.busy
 
 
-Steps = tuple[Step, ...]
+Steps = tuple[RestStep, ...]
 
 
 @dataclass(frozen=True)
@@ -205,7 +205,7 @@ class Rests:
             return steps
         if not self.modes:  # nothing to rest in: motors stay on
             return steps
-        brakes = Step(self.named(BRAKES), self.timer)
+        brakes = RestStep(self.named(BRAKES), self.timer)
         return (
             brakes,
             *(
@@ -223,9 +223,9 @@ def cut_at(steps: Steps) -> float | None:
 
 def at_once(rests: Sequence[Rest]) -> Steps:
     """Each mode as soon as the one before can be left."""
-    steps: list[Step] = []
+    steps: list[RestStep] = []
     for rest in rests:
-        steps.append(Step(rest, steps[-1].free if steps else 0.0))
+        steps.append(RestStep(rest, steps[-1].free if steps else 0.0))
     return tuple(steps)
 
 
@@ -302,7 +302,7 @@ def pause_slope(q: FloatArray, scene: PlanningScene, rests: Rests, energy: Energ
 
 def same_steps(steps: Steps, rests: Rests) -> Steps:
     """The steps with the powers of other rests."""
-    return tuple(Step(rests.named(step.rest.name), step.at) for step in steps)
+    return tuple(RestStep(rests.named(step.rest.name), step.at) for step in steps)
 
 
 def _one_watt(rests: Rests, mode: str) -> Rests:

@@ -31,7 +31,7 @@ from ir_planner.program.request import (
 )
 from ir_planner.program.savings import held_against_common, named
 from ir_planner.program.spreads import Spreads
-from ir_planner.program.station_graph import Part, Settled, StationGraph
+from ir_planner.program.station_graph import HopPart, Settled, StationGraph
 from ir_planner.program.steps import Route, Scenes, doors_advice, doors_text, placed_steps, steps_of
 from ir_planner.program.stops import Node, leaves_zone
 from ir_planner.request import Context, Journal, Work, noted
@@ -71,7 +71,7 @@ def logs_of(choice: Choice, steps: Sequence[PlannedMovement]) -> Iterator[Search
                 yield replace(log, start=names[0], goal=names[1], driven=driven)
 
 
-def _driven(part: Part, movements: Movements, steps: Sequence[PlannedMovement]) -> FloatArray:
+def _driven(part: HopPart, movements: Movements, steps: Sequence[PlannedMovement]) -> FloatArray:
     """Positions (M, 3) of the tool along the step that a part became; none where no step has its
     ends.
     """
@@ -360,7 +360,7 @@ def outlook(request: ProgramRequest, work: Work) -> Outlook:
         return Outlook(Status.success(), 0.0)
     edges = CostEdges(Movements(route, layers, context, settings.searches), 0)
 
-    def coarse(parts: list[Part]) -> list[Settled]:
+    def coarse(parts: list[HopPart]) -> list[Settled]:
         return [replace(found, exact=True) for found in edges.settle(parts)]
 
     return Outlook(Status.success(), StationGraph(edges.hops(), coarse, TOLERANCE).solve().cost)

@@ -16,7 +16,7 @@ from ir_planner.program.cycle_plan import timed_choice
 from ir_planner.program.movements import Failure, Movements, mapped
 from ir_planner.program.request import Progress, StageError
 from ir_planner.program.spreads import Spreads
-from ir_planner.program.station_graph import ACROSS, Chain, Part
+from ir_planner.program.station_graph import ACROSS, HopPart, StationChain
 from ir_planner.program.time_values import FASTEST
 from ir_planner.scene import movement_cost
 from ir_planner.timing import Movement, baseline, straight_steps
@@ -42,7 +42,7 @@ class CommonProgram:
     """
 
     choice: Choice
-    found: Mapping[Part, Movement]
+    found: Mapping[HopPart, Movement]
     around: int
 
     @property
@@ -79,7 +79,7 @@ def common_program(choice: Choice) -> CommonProgram:
     return CommonProgram(nearest, {part: chosen[part] for part in parts}, len(around))
 
 
-def nearest_chain(movements: Movements) -> Chain:
+def nearest_chain(movements: Movements) -> StationChain:
     """At each stop the configuration nearest to the one before by W."""
     chosen = [0]
     total = 0.0
@@ -90,17 +90,17 @@ def nearest_chain(movements: Movements) -> Chain:
         costs = movement_cost(weights, here, there)
         chosen.append(int(np.argmin(costs)))
         total += float(costs.min())
-    return Chain(chosen, total, total, total)
+    return StationChain(chosen, total, total, total)
 
 
-def _plain(part: Part, movements: Movements) -> Movement | None:
+def _plain(part: HopPart, movements: Movements) -> Movement | None:
     """The baseline movement of a part across, None where it isn't certified."""
     first, second = movements.ends(part)
     found = baseline(first, second, movements.asking(part, movements.context))
     return found if found is not None and found.certified else None
 
 
-def _all_found(parts: list[Part], movements: Movements, improvement: int) -> list[Movement]:
+def _all_found(parts: list[HopPart], movements: Movements, improvement: int) -> list[Movement]:
     """The movements of parts. Raises StageError for the first that isn't found."""
     found = list[Movement]()
     for each in movements.plan(parts, improvement):

@@ -9,7 +9,7 @@ import numpy as np
 
 from ir_msgs_py.modes import REST_MODES, Mode, PowerMode, TransitionTimes
 from ir_msgs_py.status import StatusCode
-from ir_planner.checks import Interval, interval, spread
+from ir_planner.checks import JouleInterval, interval, spread
 from ir_planner.errors import RequestError
 from ir_planner.presentation import plot_choices
 from ir_planner.program.pauses import (
@@ -17,7 +17,7 @@ from ir_planner.program.pauses import (
     MOTORS,
     Rest,
     Rests,
-    Step,
+    RestStep,
     Steps,
     at_once,
     bus_is_off,
@@ -43,7 +43,7 @@ _NONE: FloatArray = np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)
-class Lengths:
+class PauseLengths:
     """likely (n,) [s]: equally likely lengths, sorted. most [s]: no pause is longer. known: there
     is one only.
     """
@@ -52,11 +52,11 @@ class Lengths:
     most: float
     known: bool = False
 
-    def less(self, seconds: float) -> "Lengths":
+    def less(self, seconds: float) -> "PauseLengths":
         """What is left of each pause when `seconds` are taken from it; nothing is left of shorter
         ones.
         """
-        return Lengths(
+        return PauseLengths(
             np.maximum(self.likely - seconds, 0.0), max(self.most - seconds, 0.0), self.known
         )
 
@@ -72,7 +72,9 @@ class Lengths:
         return np.concatenate((self.likely, [self.most], between))
 
 
-def lengths_of(pause: float, samples: FloatArray = _NONE, quantiles: FloatArray = _NONE) -> Lengths:
+def lengths_of(
+    pause: float, samples: FloatArray = _NONE, quantiles: FloatArray = _NONE
+) -> PauseLengths:
     """Lengths of a request that gives one of the three: pause [s], samples (n,) or quantiles (n,)
     [s]. Raises RequestError for what is no pause.
     """
@@ -86,7 +88,7 @@ def lengths_of(pause: float, samples: FloatArray = _NONE, quantiles: FloatArray 
         )
     if not lists:
         _check(pause, "pause")
-        return Lengths(np.array([pause]), pause, known=True)
+        return PauseLengths(np.array([pause]), pause, known=True)
     (name,) = lists
     values = given[name]
     if len(values) > SAMPLES_MAX:
@@ -94,11 +96,11 @@ def lengths_of(pause: float, samples: FloatArray = _NONE, quantiles: FloatArray 
     for k, value in enumerate(values):
         _check(float(value), f"{name}[{k}]")
     if name == "pause_samples":
-        return Lengths(np.sort(values), float(values.max()))
+        return PauseLengths(np.sort(values), float(values.max()))
     return _between(values)
 
 
-def _between(quantiles: FloatArray) -> Lengths:
+def _between(quantiles: FloatArray) -> PauseLengths:
     """Equally likely lengths between neighbouring quantiles."""
     if len(quantiles) < 2:
         raise _refused(
@@ -112,7 +114,7 @@ def _between(quantiles: FloatArray) -> Lengths:
     parts = max(1, -(-_BETWEEN // (len(quantiles) - 1)))
     share = (np.arange(parts) + 0.5) / parts
     likely = quantiles[:-1, None] + share * np.diff(quantiles)[:, None]
-    return Lengths(likely.ravel(), float(quantiles[-1]))
+    return PauseLengths(likely.ravel(), float(quantiles[-1]))
 
 
 def _check(seconds: float, name: str) -> None:
@@ -182,10 +184,10 @@ class Timeouts:
             costs = self._until(at, rests.motors, 0.0) + self._from(at, rest, rests.motors, False)
             k = int(np.argmin(costs))
             if rest.watts <= rests.motors and costs[k] < best[0]:
-                best = float(costs[k]), (Step(rest, float(at[k])),)
+                best = float(costs[k]), (RestStep(rest, float(at[k])),)
         return best[1]
 
-    def _next(self, step: Step) -> Step | None:
+    def _next(self, step: RestStep) -> RestStep | None:
         """The mode after a step and its switch time; None: it is the last."""
         rest = step.rest
         lengths = self.lengths
@@ -198,7 +200,7 @@ class Timeouts:
             k = int(np.argmin(costs))
             if self._longer(at)[k] and costs[k] < least:
                 least = costs[k]
-                best = Step(deeper, float(at[k]))
+                best = RestStep(deeper, float(at[k]))
         return best
 
     def _deeper(self, rest: Rest) -> tuple[Rest, ...]:
@@ -380,7 +382,7 @@ def plan_standby(
 
 
 def advice(
-    lengths: Lengths, q: FloatArray, scene: PlanningScene, times: TransitionTimes
+    lengths: PauseLengths, q: FloatArray, scene: PlanningScene, times: TransitionTimes
 ) -> Standby:
     """How to spend a pause of these lengths at q (n,)."""
     rests = rests_at(q, scene, times)
@@ -410,8 +412,13 @@ def advice(
 
 
 def _saved_within(
-    saving: float, steps: Steps, lengths: Lengths, rests: Rests, q: FloatArray, scene: PlanningScene
-) -> Interval:
+    saving: float,
+    steps: Steps,
+    lengths: PauseLengths,
+    rests: Rests,
+    q: FloatArray,
+    scene: PlanningScene,
+) -> JouleInterval:
     """The 90 % interval of what the steps save against what the controller does by itself."""
 
     def saved(of: Rests) -> float:
@@ -442,7 +449,7 @@ def _known(rests: Rests, pause: float) -> tuple[Steps, _Cost]:
     return steps, _Cost(energy, energy, energy, late, late)
 
 
-def _policy(rests: Rests, lengths: Lengths) -> tuple[Steps, _Cost]:
+def _policy(rests: Rests, lengths: PauseLengths) -> tuple[Steps, _Cost]:
     """The timeout policy for a pause of these lengths, and its cost."""
     steps = Timeouts(rests, lengths.likely).best()
     each = np.array([rests.cost(steps, float(pause)) for pause in lengths.likely])
@@ -453,7 +460,7 @@ def _policy(rests: Rests, lengths: Lengths) -> tuple[Steps, _Cost]:
     return steps, _Cost(float(expected), float(worst[0]), clairvoyant, float(late), float(worst[1]))
 
 
-def _alone(rests: Rests, lengths: Lengths, by_itself: float) -> tuple[float, ...]:
+def _alone(rests: Rests, lengths: PauseLengths, by_itself: float) -> tuple[float, ...]:
     """Energies [J] of every mode alone, asked for at once; inf where a pause of known length is too
     short.
     """
@@ -461,7 +468,7 @@ def _alone(rests: Rests, lengths: Lengths, by_itself: float) -> tuple[float, ...
         return (by_itself, *(rests.in_time((rest,), lengths.most) for rest in rests.modes))
     return (
         by_itself,
-        *(rests.mean_cost((Step(rest, 0.0),), lengths.likely) for rest in rests.modes),
+        *(rests.mean_cost((RestStep(rest, 0.0),), lengths.likely) for rest in rests.modes),
     )
 
 
@@ -469,7 +476,7 @@ def _shown(rests: Rests, steps: Steps, most: float) -> tuple[tuple[str, ...], tu
     """Names and switch times [s] of a sequence, from the mode that the pause begins in."""
     if not steps or steps[0].at > 0.0:
         closed = not steps and rests.modes and most > rests.timer
-        brakes = (Step(rests.named(BRAKES), rests.timer),) if closed else ()
+        brakes = (RestStep(rests.named(BRAKES), rests.timer),) if closed else ()
         shown = (*steps, *brakes)
         return (MOTORS, *(step.rest.name for step in shown)), (0.0, *(step.at for step in shown))
     return tuple(step.rest.name for step in steps), tuple(step.at for step in steps)
@@ -573,7 +580,7 @@ class Trip:
 
 
 def best_posture(
-    lengths: Lengths,
+    lengths: PauseLengths,
     q: FloatArray,
     trips: tuple[Trip, ...],
     scene: PlanningScene,
@@ -592,7 +599,7 @@ def best_posture(
 
 
 def _after(
-    trip: Trip, here: Standby, lengths: Lengths, scene: PlanningScene, times: TransitionTimes
+    trip: Trip, here: Standby, lengths: PauseLengths, scene: PlanningScene, times: TransitionTimes
 ) -> Standby | None:
     """The advice with a trip; None where there is none, or not the time for it."""
     back = trip.back[0] if lengths.known else 0.0

@@ -23,7 +23,7 @@ ENTER = "enter"
 
 
 @dataclass(frozen=True, order=True)
-class Part:
+class HopPart:
     """Part of a hop: from configuration `first` of its first stop and to `second` of its second
     one; -1: of all of them, where only the other counts.
     """
@@ -77,7 +77,7 @@ class Hop:
         exact = self.exact[LEAVE] & self.exact[ACROSS] & self.exact[ENTER]
         return np.asarray(np.where(exact, self.bounds(), np.inf))
 
-    def take(self, part: Part, found: Settled) -> None:
+    def take(self, part: HopPart, found: Settled) -> None:
         """Enter what was found of a part; a bound never falls."""
         at = max(part.first, 0), max(part.second, 0)
         for known in (self.cost, self.proved) if found.exact or found.proved else (self.cost,):
@@ -85,18 +85,18 @@ class Hop:
             cost[at] = found.cost if found.exact else max(found.cost, float(cost[at]))
         self.exact[part.kind][at] |= found.exact
 
-    def open_parts(self, hop: int, first: int, second: int) -> list[Part]:
+    def open_parts(self, hop: int, first: int, second: int) -> list[HopPart]:
         """Parts of one pair that aren't exact yet."""
         parts = (
-            Part(hop, LEAVE, first, -1),
-            Part(hop, ACROSS, first, second),
-            Part(hop, ENTER, -1, second),
+            HopPart(hop, LEAVE, first, -1),
+            HopPart(hop, ACROSS, first, second),
+            HopPart(hop, ENTER, -1, second),
         )
         return [p for p in parts if not self.exact[p.kind][max(p.first, 0), max(p.second, 0)]]
 
 
 @dataclass(frozen=True)
-class Chain:
+class StationChain:
     """Index of the configuration at every stop, its cost (inf: there is none), and the least that
     any chain can cost; proved: by bounds that are proved alone.
     """
@@ -147,23 +147,23 @@ class StationGraph:
     """
 
     hops: list[Hop]
-    settle: Callable[[list[Part]], list[Settled]]
+    settle: Callable[[list[HopPart]], list[Settled]]
     tolerance: float = 0.0
     may_go_on: Callable[[], bool] = lambda: True
     must_end: Callable[[], bool] = lambda: False
 
-    def solve(self, on_cost: Callable[[float], None] = lambda cost: None) -> Chain:
+    def solve(self, on_cost: Callable[[float], None] = lambda cost: None) -> StationChain:
         """The cheapest chain; `on_cost` gets the cost of the best chain known so far."""
         while True:
             chosen, bound = shortest([hop.bounds() for hop in self.hops])
             known, cost = shortest([hop.settled() for hop in self.hops])
             if not np.isfinite(bound) or (not np.isfinite(cost) and self.must_end()):
-                return Chain(chosen, np.inf, np.inf, np.inf)
+                return StationChain(chosen, np.inf, np.inf, np.inf)
             on_cost(cost if np.isfinite(cost) else bound)
             near = bound >= cost * (1.0 - self.tolerance)
             if np.isfinite(cost) and (near or not self.may_go_on()):
                 proved = shortest([hop.bounds(proved=True) for hop in self.hops])[1]
-                return Chain(known, cost, min(bound, cost), min(proved, cost))
+                return StationChain(known, cost, min(bound, cost), min(proved, cost))
             parts = [
                 part
                 for k, hop in enumerate(self.hops)

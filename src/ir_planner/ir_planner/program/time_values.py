@@ -8,9 +8,9 @@ import numpy as np
 
 from ir_kernels import portable
 from ir_planner.program.bounds import Rates
-from ir_planner.program.movements import Failure, Movements, Near, cost_of, rates_of
+from ir_planner.program.movements import Failure, Movements, WarmStarts, cost_of, rates_of
 from ir_planner.program.request import StageError
-from ir_planner.program.station_graph import ACROSS, Part
+from ir_planner.program.station_graph import ACROSS, HopPart
 from ir_planner.request import Context
 from ir_planner.timing import Movement
 
@@ -39,12 +39,12 @@ _SAME = 1e-6  # rungs
 
 
 @dataclass(frozen=True, eq=False)
-class Kept:
+class KnownMovements:
     """Movements of parts that are known whatever was planned."""
 
-    movements: Mapping[Part, Movement]
+    movements: Mapping[HopPart, Movement]
 
-    def movement(self, part: Part) -> Movement | None:
+    def movement(self, part: HopPart) -> Movement | None:
         """The movement of a part; None where none is known."""
         return self.movements.get(part)
 
@@ -91,7 +91,7 @@ class Ladder:
         own = self.own
         if abs(rung - self._place) < _SAME:
             return own
-        near = Near(known, self._lines(rung), self._scaling(rung))
+        near = WarmStarts(known, self._lines(rung), self._scaling(rung))
         return Movements(own.route, own.layers, self._context(rung), own.searches, near)
 
     def _context(self, rung: int) -> Context:
@@ -108,13 +108,17 @@ class Ladder:
         """What is minimised at a rung."""
         return rates_of(self._context(rung))
 
-    def from_others(self, rung: int, known: Mapping[Part, Movement]) -> dict[Part, Movement]:
+    def from_others(self, rung: int, known: Mapping[HopPart, Movement]) -> dict[HopPart, Movement]:
         """Movements across at a rung, by descent from given ones; those of the parts for which one
         is found. None where movements are not found by descent.
         """
         own = self.own
         again = Movements(
-            own.route, own.layers, self._context(rung), own.searches, Near((Kept(known),))
+            own.route,
+            own.layers,
+            self._context(rung),
+            own.searches,
+            WarmStarts((KnownMovements(known),)),
         )
         if not again.descends:
             return {}
@@ -190,7 +194,7 @@ class Point:
 class SlowDown:
     """From a point of a part to the next slower one: seconds more, joules less."""
 
-    part: Part
+    part: HopPart
     to: int
     seconds: float
     joules: float
@@ -199,12 +203,12 @@ class SlowDown:
 class TimeValues:
     """Points of the parts of one chain on a ladder of values."""
 
-    def __init__(self, ladder: Ladder, parts: Sequence[Part]) -> None:
+    def __init__(self, ladder: Ladder, parts: Sequence[HopPart]) -> None:
         self.ladder = ladder
         self.parts = tuple(parts)
-        self._points: dict[Part, list[Point]] = {part: [] for part in self.parts}
+        self._points: dict[HopPart, list[Point]] = {part: [] for part in self.parts}
         self._seconds: dict[int, float] = {}
-        self._exchanged: set[tuple[int, Part]] = set()
+        self._exchanged: set[tuple[int, HopPart]] = set()
         self._own_seconds = self._take(ladder.own)
 
     def seconds(self, rung: int) -> float:
@@ -219,7 +223,7 @@ class TimeValues:
         return sum(min(point.seconds for point in points) for points in self._points.values())
 
     @property
-    def fastest(self) -> dict[Part, Movement]:
+    def fastest(self) -> dict[HopPart, Movement]:
         """The fastest movements that are known."""
         return {
             part: min(points, key=lambda p: p.seconds).movement
@@ -276,7 +280,7 @@ class TimeValues:
         ladder = self.ladder
         for rung in rungs:
             rates = ladder.rates(rung)
-            poor = dict[Part, Movement]()
+            poor = dict[HopPart, Movement]()
             for part, points in self._points.items():
                 own = ladder.at(rung).movement(part)
                 best = min(points, key=lambda point: point.cost(rates))
@@ -295,7 +299,7 @@ class TimeValues:
             min(p.joules + value * p.seconds for p in points) for points in self._points.values()
         )
 
-    def fronts(self) -> dict[Part, list[Point]]:
+    def fronts(self) -> dict[HopPart, list[Point]]:
         """The convex Pareto front of every part, fastest first."""
         return {part: convex_front(points) for part, points in self._points.items()}
 
@@ -320,7 +324,7 @@ def _saving(fast: Point, slow: Point) -> float:
     return (fast.joules - slow.joules) / more if more > 0.0 else np.inf
 
 
-def slow_downs(fronts: dict[Part, list[Point]]) -> list[SlowDown]:
+def slow_downs(fronts: dict[HopPart, list[Point]]) -> list[SlowDown]:
     """All steps to slower points, those that save most joules per second first."""
     steps = [
         SlowDown(part, k + 1, b.seconds - a.seconds, a.joules - b.joules)

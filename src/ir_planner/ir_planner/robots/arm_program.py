@@ -15,7 +15,7 @@ from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import clearance_violation
 from ir_planner.cycle import ArmSchedule, ArmWork, Lag, Wait
 from ir_planner.errors import RequestError
-from ir_planner.flexible import RUNGS, Column, slowed_down, wait_modes
+from ir_planner.flexible import RUNGS, MovementColumn, slowed_down, wait_modes
 from ir_planner.program import (
     MOTORS,
     Charge,
@@ -64,7 +64,7 @@ class ArmProgram:
     robot: str
     request: ProgramRequest
     steps: tuple[PlannedMovement, ...]
-    columns: tuple[Column, ...]
+    columns: tuple[MovementColumn, ...]
     stops: tuple[Stop, ...]
 
     @property
@@ -91,7 +91,7 @@ class ArmProgram:
         columns = tuple(self._below(k, watts) for k in range(len(self.columns)))
         return replace(self, columns=columns)
 
-    def _below(self, k: int, watts: float) -> Column:
+    def _below(self, k: int, watts: float) -> MovementColumn:
         known = self.columns[k].movements
         kept = [each for each in known if each.report.peak_power <= watts]
         slowest = known[-1]
@@ -109,14 +109,14 @@ class ArmProgram:
                     f"for {self.label(k)}, also slowed down: {least / 1e3:.1f} kW as planned",
                 )
             )
-        return Column.of(kept)
+        return MovementColumn.of(kept)
 
     def work(self, movements: Sequence[Movement] | None = None) -> ArmWork:
         """What the schedule decides about; movements: these alone instead of the columns."""
         times = self.request.settings.transitions
         curves = [column.curve for column in self.columns]
         if movements is not None:
-            curves = [Column.of([movement]).curve for movement in movements]
+            curves = [MovementColumn.of([movement]).curve for movement in movements]
         return ArmWork(
             tuple(curves),
             tuple((stop.seconds, _joules(stop.pauses)) for stop in self.stops),
@@ -334,20 +334,20 @@ def _planned(robot: str, request: ProgramRequest, journal: Journal) -> ArmProgra
     return _arm(robot, request, steps, columns)
 
 
-def _column(front: list[Movement]) -> Column:
+def _column(front: list[Movement]) -> MovementColumn:
     """Movements of a front, slowed down as far as that saves; one that keeps a tool's speed is as
     it is.
     """
     if front[0].fixed_time:
-        return Column.of(front[:1])
-    return Column.of(slowed_down(front))
+        return MovementColumn.of(front[:1])
+    return MovementColumn.of(slowed_down(front))
 
 
 def _arm(
     robot: str,
     request: ProgramRequest,
     steps: Sequence[PlannedMovement],
-    columns: Sequence[Column],
+    columns: Sequence[MovementColumn],
 ) -> ArmProgram:
     first = columns[0].movements[0]
     end = columns[-1].movements[0].trajectory.positions[-1]
@@ -381,5 +381,5 @@ def _arm(
     return ArmProgram(robot, request, tuple(moving), tuple(columns), stops)
 
 
-def _scene(column: Column) -> PlanningScene:
+def _scene(column: MovementColumn) -> PlanningScene:
     return column.movements[0].context.scene

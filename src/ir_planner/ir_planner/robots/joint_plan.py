@@ -17,9 +17,9 @@ from ir_planner.cycle import (
     ArmSchedule,
     ArmWork,
     JointCycle,
-    Stretch,
     WaitMode,
     Zone,
+    ZoneStretch,
     cheapest_joint,
     shortest_joint,
     zones_of,
@@ -230,7 +230,7 @@ class _Joint:
             raise self._blocked(zone.one, zone.other)
         return replace(zone, first=tuple(first))
 
-    def _blocked(self, own: Stretch, other: Stretch) -> RequestError:
+    def _blocked(self, own: ZoneStretch, other: ZoneStretch) -> RequestError:
         arms = self.arms[own.robot], self.arms[other.robot]
         there = self._span(other)
         return RequestError(
@@ -241,7 +241,7 @@ class _Joint:
             "a park posture that faces away, between the others",
         )
 
-    def _span(self, stretch: Stretch) -> tuple[str, str]:
+    def _span(self, stretch: ZoneStretch) -> tuple[str, str]:
         arm = self.arms[stretch.robot]
         return arm.label(stretch.first), arm.label(stretch.first + stretch.count - 1)
 
@@ -380,7 +380,7 @@ def _turn(zone: Zone, later: bool, arms: Arms) -> int:
     return int(begun[1] or (later and not begun[0]))
 
 
-def _passed(stretch: Stretch, cycle: JointCycle, count: int) -> tuple[float, float]:
+def _passed(stretch: ZoneStretch, cycle: JointCycle, count: int) -> tuple[float, float]:
     """When a robot enters and leaves a zone [s]."""
     schedule = cycle.arms[stretch.robot]
     last = stretch.first + stretch.count - 1

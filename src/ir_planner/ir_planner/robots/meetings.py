@@ -16,7 +16,7 @@ from ir_description import Equipment, RobotCells
 from ir_kernels import FREE
 from ir_kernels.swept import SweptArm, meeting
 from ir_msgs_py.status import StatusCode
-from ir_planner.cycle import Stretch, Zone
+from ir_planner.cycle import Zone, ZoneStretch
 from ir_planner.errors import RequestError
 from ir_planner.robots.arm_program import ArmProgram
 from ir_planner.scene import PROOF_TOLERANCE
@@ -121,7 +121,7 @@ def ordered(cell: Pair, zones: Sequence[Zone], arms: tuple[ArmProgram, ArmProgra
     )
 
 
-def _holds(stretch: Stretch, activity: int, count: int) -> bool:
+def _holds(stretch: ZoneStretch, activity: int, count: int) -> bool:
     return (activity - (2 * stretch.first + 1)) % (2 * count) < 2 * stretch.count - 1
 
 

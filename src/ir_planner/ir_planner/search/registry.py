@@ -36,7 +36,7 @@ NAMES_OF_SETTINGS = ("transitions", "interaction", "withdrawal")
 
 
 @dataclass(frozen=True)
-class Unusable:
+class UnusableSearch:
     """Stands in for a search whose package can't be used: it refuses with the reason."""
 
     why: str = setting("", "Why the installed package can't be used.", read_only=True)
@@ -73,7 +73,7 @@ _OWN: dict[str, Search] = {
     "aorrtc": Aorrtc(),
 }
 SEARCHES: Registry[Search] = Registry(
-    "ir_planner.searches", _OWN, made_search, stand_in=Unusable, reserved=NAMES_OF_SETTINGS
+    "ir_planner.searches", _OWN, made_search, stand_in=UnusableSearch, reserved=NAMES_OF_SETTINGS
 )
 
 
@@ -86,6 +86,6 @@ def registered() -> Mapping[str, Search]:
 
 def not_installed(search: Search) -> str:
     """How to install what a search needs, or why its package can't be used; "" where it can."""
-    if isinstance(search, Unusable):
+    if isinstance(search, UnusableSearch):
         return search.why
     return missing() if needs_ompl(search) else ""

@@ -13,7 +13,7 @@ from ir_kernels.search import BidirectionalTree
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.search.port import Ends, Found
-from ir_planner.search.upright_tree import Meeting, connect_upright
+from ir_planner.search.upright_tree import TreeMeeting, connect_upright
 from ir_values.arrays import FloatArray
 from ir_values.settings import check_settings, setting
 
@@ -55,7 +55,7 @@ class Tree:
 
 def connect(
     start: FloatArray, goals: FloatArray, space: FreeSpace, seed: int, most: int = 2**62
-) -> Meeting:
+) -> TreeMeeting:
     """A free path from start (n,) to one of goals (G, n), unless the budget, or `most` edges, end
     before one is found.
 
@@ -80,5 +80,5 @@ def connect(
         found = search.grow(min(_SLICE, work.max_iterations - work.iterations, most - before))
         work.spend(search.edges - before)
         if found:
-            return Meeting(search.path, 0.0)
-    return Meeting(None, search.gap)
+            return TreeMeeting(search.path, 0.0)
+    return TreeMeeting(None, search.gap)

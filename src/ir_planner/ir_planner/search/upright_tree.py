@@ -31,7 +31,7 @@ _FIRST = 64  # nodes that a tree has room for at first
 
 
 @dataclass(frozen=True, eq=False)
-class Meeting:
+class TreeMeeting:
     """A free path (M, n), or None; then gap [rad]: how near the trees came, each joint by its
     scale.
     """
@@ -85,7 +85,7 @@ class _Tree:
 
 def connect_upright(
     start: FloatArray, goals: FloatArray, space: FreeSpace, cone: ToolCone, seed: int, most: int
-) -> Meeting:
+) -> TreeMeeting:
     """A free path from start (n,) to one of goals (G, n), unless the budget, or `most` edges, end
     before one is found. Raises CancelledError when asked to stop.
     """
@@ -95,8 +95,8 @@ def connect_upright(
     while not work.exhausted and work.iterations < until:
         path = search.round()
         if path is not None:
-            return Meeting(path, 0.0)
-    return Meeting(None, search.gap)
+            return TreeMeeting(path, 0.0)
+    return TreeMeeting(None, search.gap)
 
 
 class _Search:

@@ -81,7 +81,7 @@ def _until_out(path: FloatArray, problem: Exit) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Unusable:
+class UnusableWithdrawal:
     """Stands in for a search whose package can't be used: it refuses with the reason."""
 
     why: str = setting("", "Why the installed package can't be used.", read_only=True)
@@ -111,7 +111,7 @@ EXIT_SEARCHES: Registry[ExitSearch] = Registry(
     "ir_planner.exit_searches",
     {"modified_ga": ModifiedGa(), "tree": ExitTree()},
     made_exit_search,
-    stand_in=Unusable,
+    stand_in=UnusableWithdrawal,
 )
 _SEARCHED = (
     2  # raw paths per candidate that is wanted: shortened, some of them end at the same place

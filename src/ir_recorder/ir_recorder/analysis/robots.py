@@ -28,7 +28,7 @@ _STAMPS = 0.05  # s: readings of two robots that come every 10 ms, and the answe
 
 
 @dataclass(frozen=True)
-class Nearest:
+class RobotDistance:
     """The least distance [m] of two robots, when it was [s], and of which capsules."""
 
     distance: float
@@ -36,7 +36,7 @@ class Nearest:
     capsules: tuple[str, str]
 
 
-def nearest(one: Analysis, other: Analysis) -> Nearest | None:
+def nearest(one: Analysis, other: Analysis) -> RobotDistance | None:
     """How near two robots came to each other; None where joint states or a cell are missing."""
     arms = [_Arm.of(analysis) for analysis in (one, other)]
     if arms[0] is None or arms[1] is None:
@@ -103,8 +103,8 @@ class _Arm:
         return found
 
 
-def _least(one: _Arm, other: _Arm, times: FloatArray) -> Nearest:
-    best = Nearest(np.inf, float(times[0]), ("", ""))
+def _least(one: _Arm, other: _Arm, times: FloatArray) -> RobotDistance:
+    best = RobotDistance(np.inf, float(times[0]), ("", ""))
     others = other.segments(times)
     for name, radius, ends, there in one.segments(times):
         for its_name, its_radius, its_ends, its_there in others:
@@ -112,7 +112,7 @@ def _least(one: _Arm, other: _Arm, times: FloatArray) -> Nearest:
             distance = np.where(there & its_there, axes - radius - its_radius, np.inf)
             k = int(distance.argmin())
             if distance[k] < best.distance:
-                best = Nearest(float(distance[k]), float(times[k]), (name, its_name))
+                best = RobotDistance(float(distance[k]), float(times[k]), (name, its_name))
     return best
 
 

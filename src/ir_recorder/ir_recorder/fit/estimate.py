@@ -98,7 +98,7 @@ _RATIO = 1.25  # from one factor to the next
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class EnergyStretch:
     """A movement or a rest: the fold it belongs to, the sum of what its samples miss, how that sum
     changes with the parameters (P,), and the variance that the meter alone gives it.
     """
@@ -116,7 +116,7 @@ def widening(
     fold: IntArray,
     pull: FloatArray,
     deviation: FloatArray,
-    stretches: Sequence[Stretch],
+    stretches: Sequence[EnergyStretch],
     *,
     stay: bool = False,
 ) -> float:
@@ -631,7 +631,7 @@ class Estimate:
         """The factor on the noise that the residual energies of movements and rests take."""
         missing, slopes = self.rows(x)
         fold = self._folds()
-        stretches: list[Stretch] = []
+        stretches: list[EnergyStretch] = []
         for run in self.runs:
             inside = run.samples
             spans = [(span, True) for span in movements(inside)]
@@ -650,7 +650,7 @@ class Estimate:
         missing: FloatArray,
         slopes: FloatArray,
         fold: IntArray,
-    ) -> list[Stretch]:
+    ) -> list[EnergyStretch]:
         """What a movement or a rest misses: its energy at the mains, and the work of its motors."""
         first = run.first + span[0] // WINDOW
         last = run.first + span[1] // WINDOW
@@ -668,7 +668,7 @@ class Estimate:
                 by = WINDOW * channel.speed.T.ravel()[within]
             white = self._white(channel, missing[begin - count : begin])[channel.group[within]]
             found += [
-                Stretch(
+                EnergyStretch(
                     True,
                     int(np.median(fold[rows[part]])),
                     float(by[part] @ missing[rows[part]]),

@@ -71,7 +71,7 @@ class StartAndStop(Protocol):
         """Why the last recording ended on its own or lost its file, "" when it didn't."""
 
 
-class Services:
+class RecorderServices:
     """Offers start and stop on `node` for `recorder`."""
 
     def __init__(self, node: Node, recorder: StartAndStop) -> None:
@@ -222,7 +222,7 @@ class RecorderNode(Node):
         )
         self._diagnostics = RecorderDiagnostics(self)
         if name == names.RECORDER:  # a command's own recording is no service of the cell
-            self._requests = Services(self, self)
+            self._requests = RecorderServices(self, self)
         self.create_timer(self._settings.discovery_period, self._discover)
         self.create_timer(POLL_PERIOD, self._collect)
         self.create_timer(1.0, self._each_second)

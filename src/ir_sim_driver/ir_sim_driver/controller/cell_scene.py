@@ -38,7 +38,7 @@ from ir_values.errors import InvalidValueError
 SOON = 0.5
 
 
-class Machines:
+class MachinesInScene:
     """Machines of `cell`; times [s] are of the plant."""
 
     def __init__(self, cell: Cell) -> None:
@@ -302,7 +302,7 @@ class ContactScene:
 
     @classmethod
     def of(
-        cls, cell: Cell, chain: Chain, load: Carried, machines: Machines, parts: Parts
+        cls, cell: Cell, chain: Chain, load: Carried, machines: MachinesInScene, parts: Parts
     ) -> ContactScene:
         """The scene of the cell as its machines and parts are now."""
         floor = tuple(body for body in cell.bodies() if body.name == "floor") if cell.floor else ()

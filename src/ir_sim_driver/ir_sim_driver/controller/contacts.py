@@ -19,7 +19,7 @@ from ir_sim_driver.controller.cell_scene import (
     SOON,
     ContactScene,
     Keep,
-    Machines,
+    MachinesInScene,
     Parts,
 )
 from ir_sim_driver.controller.safety import Safety
@@ -306,7 +306,7 @@ class CellWatch:
         self._notices = notices
         self._dt = dt
         self._now = now
-        self._machines = Machines(cell)
+        self._machines = MachinesInScene(cell)
         self._parts = Parts(cell, load)
         self._contacts = ContactWatch(cell.robot.acceleration_max, dt)
         self._cell = cell

@@ -20,7 +20,7 @@ from ir_msgs_py.names import END_REST, TAKE_BACK
 from ir_msgs_py.plc import OperatingMode, PlcInputs
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.controller.access import Access, CellSide, PlcSide
-from ir_sim_driver.controller.cell_scene import ContactScene, Machines, Parts
+from ir_sim_driver.controller.cell_scene import ContactScene, MachinesInScene, Parts
 from ir_sim_driver.controller.contacts import ContactWatch
 from ir_sim_driver.controller.goals import NO_GOAL, Goals, refused
 from ir_sim_driver.controller.outputs import Entry, Frame, Frames, Joints, report
@@ -47,7 +47,7 @@ def try_cell(simulation: Simulation, cell: Cell) -> str:
         load, _ = simulation.surroundings.load_in(cell, simulation.load)
         chain = Chain(robot, cell.base_pose, cell.tcp)
         dynamics = DynamicsModel(robot, load.loads, cell.base_pose)
-        scene = ContactScene.of(cell, chain, load, Machines(cell), Parts(cell, load))
+        scene = ContactScene.of(cell, chain, load, MachinesInScene(cell), Parts(cell, load))
         watch = ContactWatch(robot.acceleration_max, simulation.settings.dt)
         watch.watch(scene, simulation.backend.q, "", True)
         watch.look(0, simulation.backend, dynamics)

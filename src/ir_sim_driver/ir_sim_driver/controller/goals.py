@@ -36,7 +36,7 @@ class _Waiting:
     canceled: bool = False
 
 
-class GoalQueue:
+class TrajectoryQueue:
     """Goals that wait, bounded in number, points and bytes together. No thread, no lock."""
 
     def __init__(self) -> None:
@@ -142,7 +142,7 @@ class Goals:
         self._now = now
         self._checker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="trajectory_checks")
         self._dead = ""
-        self._queue = GoalQueue()
+        self._queue = TrajectoryQueue()
         self._stop_seen = simulation.stop_number
         self._running: dict[int, int] = {}  # ids of started goals by ticket
         self._waiting: dict[int, tuple[int, Ended]] = {}  # tickets and senders by id

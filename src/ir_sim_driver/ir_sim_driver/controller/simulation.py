@@ -21,7 +21,7 @@ from ir_sim_driver.controller.mode_control import ModeControl
 from ir_sim_driver.controller.safety import Safety
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.controller.supervision import PERIOD
-from ir_sim_driver.controller.surroundings import Surroundings
+from ir_sim_driver.controller.surroundings import MovedSurroundings
 from ir_sim_driver.errors import (
     BackendError,
     DriverError,
@@ -172,7 +172,7 @@ class Simulation:
         self.cell = cell
         self.robot = cell.robot
         self.backend = backend
-        self.surroundings = Surroundings(cell)
+        self.surroundings = MovedSurroundings(cell)
         self.notices = Notices()
         self.watch = Watchdog()
         home = np.array(cell.machine_home)

@@ -62,7 +62,7 @@ def _content(value: object) -> Iterator[bytes]:
         yield repr(value).encode()
 
 
-class Surroundings:
+class MovedSurroundings:
     """cell: the one that counts. `offered`: one that counts as soon as the robot stands."""
 
     def __init__(self, cell: Cell) -> None:

@@ -49,7 +49,7 @@ from ir_sim_driver.node.presses import (
     presses_the_stop,
 )
 from ir_sim_driver.node.real_time import FOREIGN, OWN, SYSTEM, GridThread, ScaledClock
-from ir_sim_driver.node.services import Services
+from ir_sim_driver.node.services import DriverServices
 from ir_sim_driver.node.streams import Streams
 from ir_sim_driver.node.trajectory_actions import Admission, BoundedActionServer, Executions
 from ir_sim_driver.node.visualization import RobotMarkers, open_transforms
@@ -171,7 +171,7 @@ class SimDriver(Node):
         if follow is not None:
             self._actions.append(self._serve_action(follow, own(names.FOLLOW_JOINT_TRAJECTORY)))
         StateQueries(self._driver).offer(self)
-        answers = Services(self._driver, self.get_name(), self._announcements.look)
+        answers = DriverServices(self._driver, self.get_name(), self._announcements.look)
         self._answers = answers
         self._presses = OwnParticipant(self, "presses")
         self._requests = OwnParticipant(self, "requests")

@@ -21,7 +21,7 @@ from ir_sim_driver.plc import SERVICE
 from ir_values.errors import IrError
 
 
-class Services:
+class DriverServices:
     """Answers for `driver` in the name of `source`; load_changed is called when the robot carries
     another.
     """

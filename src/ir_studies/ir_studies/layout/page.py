@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from ir_description import Cell, cell_to_yaml
-from ir_planner.checks import Interval
+from ir_planner.checks import JouleInterval
 from ir_recorder.report.files import write_output
 from ir_recorder.report.number_text import DASH, joules, millimetres, percent, text
 from ir_recorder.report.page import PAGE_START
@@ -225,7 +225,7 @@ def _rows(finals: Sequence[Sequence[Final]]) -> Iterator[tuple[str, ...]]:
             )  # fmt: skip
 
 
-def _with_interval(value: str, within: Interval) -> str:
+def _with_interval(value: str, within: JouleInterval) -> str:
     """A value with its interval on a line of its own."""
     return f"{value}<br><small>{joules(within.low)} … {joules(within.high)}</small>"
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_planner.checks import Interval, interval
+from ir_planner.checks import JouleInterval, interval
 from ir_recorder.report.number_text import joules, percent
 from ir_studies.layout.placement import FIRST_SEED, Known, Placement
 from ir_studies.layout.search import BATCH, GIVEN, best_of
@@ -54,11 +54,11 @@ class Final:
         return np.array(self.rows[0]["robots"])
 
     @property
-    def interval(self) -> Interval:
+    def interval(self) -> JouleInterval:
         """The 90 % interval of its joules."""
         return interval(self.mean(), self.robots)
 
-    def saving(self, given: Final) -> tuple[float, Interval]:
+    def saving(self, given: Final) -> tuple[float, JouleInterval]:
         """Joules that it takes less than the given one, with their 90 % interval."""
         less = given.mean() - self.mean()
         return less, interval(less, given.robots - self.robots)

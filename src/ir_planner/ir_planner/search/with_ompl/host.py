@@ -32,7 +32,7 @@ STOP = "stop"
 
 
 @dataclass(frozen=True)
-class Parameters:
+class OmplParameters:
     """planner: name of a class in ompl.geometric; values: what its set... methods are called with,
     by the rest of their names; cell [rad]: cells of KPIECE's grid over the first three joints, 0
     for OMPL's own projection; reverse: it is asked for the movement from the goals to the start.
@@ -45,7 +45,7 @@ class Parameters:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class OmplProblem:
     """From start (n,) to any of goals (G, n), farther from everything than threshold (Z,) m;
     `edges`: checks before it is given up; `seconds`: after which the process is ended, whatever it
     does.
@@ -55,7 +55,7 @@ class Problem:
     threshold: FloatArray
     start: FloatArray
     goals: FloatArray
-    parameters: Parameters
+    parameters: OmplParameters
     seed: int
     edges: int
     seconds: float
@@ -212,7 +212,7 @@ def check_installed(name: str) -> None:
         raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, f"planner_id {name!r}: {missing()}")
 
 
-def asked(problem: Problem, work: Work) -> OmplAnswer:
+def asked(problem: OmplProblem, work: Work) -> OmplAnswer:
     """OMPL's answer; its checks are charged to `work`, at whose end, or deadline, it is stopped.
 
     Raises CancelledError when asked to stop.
@@ -228,7 +228,7 @@ def asked(problem: Problem, work: Work) -> OmplAnswer:
     return outcome
 
 
-def _answer(connection: Connection, process: int, problem: Problem, work: Work) -> OmplAnswer:
+def _answer(connection: Connection, process: int, problem: OmplProblem, work: Work) -> OmplAnswer:
     """What the process says to the problem. Both go through a file in memory, which never
     blocks.
     """

@@ -12,7 +12,7 @@ from ir_planner.request import Work
 from ir_planner.search.port import Ends, Found
 from ir_planner.search.tree import connect
 from ir_planner.search.variety import NEAREST_GOALS
-from ir_planner.search.with_ompl.host import Parameters, Problem, asked, check_installed
+from ir_planner.search.with_ompl.host import OmplParameters, OmplProblem, asked, check_installed
 from ir_values.arrays import FloatArray
 from ir_values.settings import check_settings, setting
 
@@ -24,7 +24,7 @@ _REPAIR = 4000  # edges of a tree around a blocked step
 
 def found_by(
     name: str,
-    parameters: Parameters,
+    parameters: OmplParameters,
     edges: int,
     ends: Ends,
     space: FreeSpace,
@@ -43,7 +43,7 @@ def found_by(
         return Found([], "no work was left")
     goals = ends.goals[:NEAREST_GOALS]
     seconds = work.deadline - work.clock()
-    problem = Problem(
+    problem = OmplProblem(
         space.scene, space.threshold, ends.start, goals, parameters, seed, checks, seconds
     )
     outcome = asked(problem, work)
@@ -121,7 +121,7 @@ class OmplSearch:
 
     def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
         """One path, or none."""
-        parameters = Parameters(self.planner, self.parameters(), self.cells(), self.reverse)
+        parameters = OmplParameters(self.planner, self.parameters(), self.cells(), self.reverse)
         return found_by(self.planner_id, parameters, self.edges, ends, space, seed, work)
 
 

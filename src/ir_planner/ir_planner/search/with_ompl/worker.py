@@ -22,7 +22,7 @@ import numpy as np
 
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
-from ir_planner.search.with_ompl.host import OmplAnswer, Parameters, Problem
+from ir_planner.search.with_ompl.host import OmplAnswer, OmplParameters, OmplProblem
 
 try:
     from ompl import base, geometric, util
@@ -71,7 +71,7 @@ def _answer(connection: Connection, parent: int) -> None:
     connection.send(os.getpid())
     with os.fdopen(recv_handle(connection), "r+b") as sheet:
         sheet.seek(0)
-        problem: Problem = pickle.load(sheet)
+        problem: OmplProblem = pickle.load(sheet)
         signal.setitimer(signal.ITIMER_REAL, problem.seconds + _GRACE)
         try:
             outcome = (
@@ -97,7 +97,7 @@ class _Counted:
     asks it too.
     """
 
-    def __init__(self, problem: Problem, connection: Connection) -> None:
+    def __init__(self, problem: OmplProblem, connection: Connection) -> None:
         self._space = FreeSpace(problem.scene, problem.threshold, Work(2**62, 1.0, lambda: 0.0))
         self._most = problem.edges * STATES_PER_EDGE
         self._connection = connection
@@ -142,7 +142,7 @@ class _Counted:
         self.end.terminate()
 
 
-def solved(problem: Problem, connection: Connection) -> OmplAnswer:
+def solved(problem: OmplProblem, connection: Connection) -> OmplAnswer:
     """One planner, one problem."""
     util.RNG.setSeed(problem.seed % (2**32 - 1) + 1)
     counted = _Counted(problem, connection)
@@ -192,7 +192,7 @@ def _validator(information: base.SpaceInformation, counted: _Counted) -> base.Mo
 
 
 def _planner(
-    information: base.SpaceInformation, space: base.StateSpace, parameters: Parameters
+    information: base.SpaceInformation, space: base.StateSpace, parameters: OmplParameters
 ) -> base.Planner:
     planner = getattr(geometric, parameters.planner)(information)
     for name, value in parameters.values.items():
