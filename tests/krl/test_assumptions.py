@@ -609,6 +609,10 @@ def test_the_data_list_beside_a_file_has_its_name_in_any_case(
 
 
 def test_a_project_says_why_no_program_is_found(tmp_path: Path) -> None:
+    database = tmp_path / "cell.wvs"
+    database.write_bytes(bytes(16) + bytes.fromhex("9d7b3500") + bytes(4096))
+    with pytest.raises(KrlError, match="WorkVisual's database, no archive: give the folder"):
+        read_project(database)
     for folder in ("a", "b"):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "p.src").write_text("DEF P( )\nPTP XHOME\nEND\n")

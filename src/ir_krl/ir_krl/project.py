@@ -20,6 +20,9 @@ from ir_values.files import ANYWHERE
 BYTES_MAX = 4_000_000  # of a file
 FILES_MAX = 20_000
 ARCHIVES = (".zip", ".wvs")
+_DATABASE_AT = 16
+_DATABASE = bytes.fromhex("9d7b3500")
+"""What stands there in a file of SQL Server Compact 3.5, in which WorkVisual keeps projects."""
 _KINDS = (".src", ".dat", ".sub")
 _ROBOT = re.compile(r"R\d{1,2}", re.IGNORECASE)
 _MOTIONS = ("ptp", "lin", "circ", "spline_block")
@@ -179,6 +182,12 @@ def _of_folder(path: Path) -> Iterator[File]:
 
 def _of_archive(path: Path) -> Iterator[File]:
     try:
+        with ANYWHERE.open_to_read(path) as stream:
+            if stream.read(len(_DATABASE) + _DATABASE_AT)[_DATABASE_AT:] == _DATABASE:
+                raise KrlError(
+                    f"{path.name} is a project in WorkVisual's database, no archive: give the "
+                    "folder of its files (KRC), or the archive (.zip) that the controller makes"
+                )
         with ANYWHERE.open_to_read(path) as stream, zipfile.ZipFile(stream) as archive:
             for one in sorted(archive.infolist(), key=lambda one: one.filename)[:FILES_MAX]:
                 inside = PurePosixPath(one.filename.replace("\\", "/"))
