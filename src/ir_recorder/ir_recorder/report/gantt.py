@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -45,6 +45,16 @@ def mode_bars(power: PowerSeries, span: Span) -> list[Bar]:
         )
         for a, b in zip(begins[:-1].tolist(), begins[1:].tolist(), strict=True)
     ]
+
+
+def legend(kinds: Mapping[str, str]) -> str:
+    """What the styles of bars mean."""
+    words = "".join(
+        f'<span><svg class="gantt key" viewBox="0 0 10 10"><rect class="{kind}" width="10" '
+        f'height="10"/></svg> {text(name)}</span> '
+        for kind, name in kinds.items()
+    )
+    return f'<p class="key-row">{words}<span>power: mean of each {_BINS}th of the time</span></p>'
 
 
 class Gantt:

@@ -14,7 +14,7 @@ from ir_recorder.analysis.results import StepResult
 from ir_recorder.analysis.robots import zone_passes
 from ir_recorder.analysis.tending import Span
 from ir_recorder.report.files import write_output
-from ir_recorder.report.gantt import Bar, Gantt, mode_bars
+from ir_recorder.report.gantt import Bar, Gantt, legend, mode_bars
 from ir_recorder.report.headline import verdict
 from ir_recorder.report.number_text import DASH, joules, seconds, text, watts
 from ir_recorder.report.page import PAGE_START, asset
@@ -135,6 +135,12 @@ def _whole(analyses: Mapping[str, Analysis]) -> Span:
     return Span(min(span.begin for span in spans), max(span.end for span in spans))
 
 
+_KINDS = {
+    "loaded": "robot moves; in a zone, the upper one of its two robots",
+    "empty": "pause of the program; in a zone, the lower one",
+}
+
+
 def _figure(analyses: Mapping[str, Analysis]) -> str:
     span = _whole(analyses)
     if span.seconds <= 0.0:
@@ -151,7 +157,8 @@ def _figure(analyses: Mapping[str, Analysis]) -> str:
             [(style, each, robot) for (robot, spans), style in styles for each in spans],
         )
     chart.power([a.recording.power for a in analyses.values() if a.recording.power is not None])
-    return f'<figure class="figure">{chart.drawn("robots", "robots, zones and power")}</figure>'
+    drawn = chart.drawn("robots", "robots, zones and power")
+    return f'{legend(_KINDS)}<figure class="figure">{drawn}</figure>'
 
 
 def _bar(result: StepResult) -> Bar:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.tending import PartRow, Span, Tending
 from ir_recorder.reading.recording import PowerSeries
-from ir_recorder.report.gantt import Bar, Gantt, mode_bars
+from ir_recorder.report.gantt import Bar, Gantt, legend, mode_bars
 from ir_recorder.report.number_text import DASH, joules, seconds, text
 from ir_recorder.report.tables import table
 
@@ -22,7 +22,7 @@ def tending_section(analysis: Analysis) -> str:
     charts = "".join(_figure(part, tending, analysis.recording.power) for part in tending.parts)
     return (
         '<section id="tending"><h2>Parts: what each took, and who waited for whom</h2>'
-        f"{_parts(tending)}{_legend()}{charts}</section>"
+        f"{_parts(tending)}{legend(_KINDS)}{charts}</section>"
     )
 
 
@@ -54,18 +54,11 @@ def _waits(waits: Mapping[str, float]) -> str:
     return "<br>".join(said) or DASH
 
 
-def _legend() -> str:
-    kinds = (
-        ("loaded", "robot with a part, machine at work"),
-        ("empty", "robot without, finished part that waits"),
-        ("late", "robot waits for a late signal"),
-    )
-    words = "".join(
-        f'<span><svg class="gantt key" viewBox="0 0 10 10"><rect class="{kind}" width="10" '
-        f'height="10"/></svg> {name}</span> '
-        for kind, name in kinds
-    )
-    return f'<p class="key-row">{words}</p>'
+_KINDS = {
+    "loaded": "robot with a part, machine at work",
+    "empty": "robot without, finished part that waits",
+    "late": "robot waits for a late signal",
+}
 
 
 def _figure(part: PartRow, tending: Tending, power: PowerSeries | None) -> str:
