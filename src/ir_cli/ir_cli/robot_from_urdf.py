@@ -102,7 +102,7 @@ def _made(source: RobotSource) -> MadeRobot:
     pairs = pairs_of(arm, shapes.capsules, bodies, low, high, home)
     if pairs.unclear:
         shapes = capsules_of(arm, bodies, names, sheet.radii, shapes, pairs.unclear)
-        pairs = pairs_of(arm, shapes.capsules, bodies, low, high, home)
+        pairs = pairs_of(arm, shapes.capsules, bodies, low, high, home, pairs.unclear)
     notes = [*arm.notes, *meshes.notes, *masses, *sheet.notes]
     if given is None:
         sheet = with_home(sheet, _home(arm, sheet, shapes, pairs, (low, high)))

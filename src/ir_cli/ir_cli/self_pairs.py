@@ -9,7 +9,7 @@ the narrowest that holds it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +39,7 @@ _LEFT = 0.3  # of the postures that a pair must leave
 LEAST_LEFT = 0.1
 """Share of postures that two links must leave to be told apart by their capsules."""
 _VOXELS = 60  # along a capsule: one point stands for the surface in each
+_FINE = 0.006  # m: edge of a voxel of a link that is looked at more closely, at most
 _ALONG = 20  # points along a body that is a capsule
 _TOUCH = 1e-9  # m: of rounding, by which a corner may be out of its capsule
 _HALVINGS = 16
@@ -67,8 +68,11 @@ def pairs_of(
     low: FloatArray,
     high: FloatArray,
     home: FloatArray | None,
+    finer: Set[int] = frozenset(),
 ) -> Pairs:
-    """All pairs of capsules of links that are no neighbours; home: a given one [rad]."""
+    """All pairs of capsules of links that are no neighbours; home: a given one [rad]; finer: links
+    whose surfaces are looked at in small pieces.
+    """
     far = [
         (a.name, b.name)
         for k, a in enumerate(capsules)
@@ -80,7 +84,7 @@ def pairs_of(
     q = np.random.default_rng(0).uniform(low, high, (POSTURES, len(low)))
     distance = model.distances(q)
     named = {capsule.name: capsule for capsule in capsules}
-    surfaces = _Surfaces(arm, capsules, bodies)
+    surfaces = _Surfaces(arm, capsules, bodies, finer)
     groups: dict[tuple[int, int], list[int]] = {}
     for z, (_, first, second) in enumerate(model.pairs):
         if float((distance[:, z] <= SAFETY).mean()) > NEAR:
@@ -143,9 +147,6 @@ class _Points(NamedTuple):
     at: FloatArray
     radius: FloatArray
 
-    def chosen(self, which: BoolArray) -> _Points:
-        return _Points(self.at[which], self.radius[which])
-
     def moved(self, pose: FloatArray) -> _Points:
         return _Points(self.at @ pose[:3, :3].T + pose[:3, 3], self.radius)
 
@@ -154,8 +155,13 @@ class _Surfaces:
     """Surfaces of the links, shared out among their capsules."""
 
     def __init__(
-        self, arm: UrdfArm, capsules: Sequence[Capsule], bodies: Sequence[Sequence[LinkBody]]
+        self,
+        arm: UrdfArm,
+        capsules: Sequence[Capsule],
+        bodies: Sequence[Sequence[LinkBody]],
+        finer: Set[int],
     ) -> None:
+        self._finer = finer
         self._rounding = arm.rounding
         self._capsules = capsules
         self._bodies = bodies
@@ -184,7 +190,10 @@ class _Surfaces:
                 continue
             for k, share in enumerate(_shared_out(body.triangles, capsules)):
                 size = float(np.linalg.norm(capsules[k].p1 - capsules[k].p0))
-                at, around = _voxels(share, size + 2.0 * capsules[k].radius)
+                step = (size + 2.0 * capsules[k].radius) / _VOXELS
+                if capsules[k].link in self._finer:
+                    step = min(step, _FINE)
+                at, around = _voxels(share, step)
                 found[k].append(_Points(at, around + wider))
         return [
             _Points(
@@ -231,13 +240,15 @@ def _shared_out(triangles: FloatArray, capsules: Sequence[Capsule]) -> list[Floa
     return [np.concatenate(each) for each in found]
 
 
-def _voxels(triangles: FloatArray, size: float) -> tuple[FloatArray, FloatArray]:
-    """One point (N, 3) for the triangles in each voxel, and the radius (N,) that holds these."""
+def _voxels(triangles: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
+    """One point (N, 3) for the triangles in each voxel of an edge of `step` [m], and the radius
+    (N,) that holds these.
+    """
     if not len(triangles):
         return np.zeros((0, 3)), np.zeros(0)
-    triangles = fine_triangles(triangles, size / _VOXELS)
+    triangles = fine_triangles(triangles, step)
     centres = triangles.mean(axis=1)
-    cells = np.floor((centres - centres.min(axis=0)) / (size / _VOXELS)).astype(np.int64)
+    cells = np.floor((centres - centres.min(axis=0)) / step).astype(np.int64)
     _, which = np.unique(np.ravel_multi_index(cells.T, cells.max(axis=0) + 1), return_inverse=True)
     which = which.ravel()
     count = np.bincount(which)
@@ -353,7 +364,8 @@ class _Meeting:
 
     def _meet(self, q: FloatArray) -> BoolArray:
         """Whether the surfaces meet or may meet, by the radii of their points (N,)."""
-        sides = (0, 1) if self.built_so else (0,)
+        fewer = int(np.argmin([len(each.at) for each in self._sides]))
+        sides = (0, 1) if self.built_so else (fewer,)
         result = np.zeros(len(q), dtype=bool)
         for k, poses in enumerate(self._relative(q)):
             result[k] = any(len(self._meeting(side, poses[side])) for side in sides)
@@ -368,17 +380,22 @@ class _Meeting:
     def _meeting(self, side: int, pose: FloatArray) -> IntArray:
         """Which points of a side may meet the other one; pose: of their link in the other one."""
         facing = self._capsules[1 - side]
-        chosen = np.flatnonzero(self._counted[side])
-        points = self._sides[side].chosen(self._counted[side]).moved(pose)
+        own = self._sides[side]
+        middle = pose[:3, :3].T @ (0.5 * (facing.p0 + facing.p1) - pose[:3, 3])
+        reach = 0.5 * float(np.linalg.norm(facing.p1 - facing.p0)) + facing.radius
+        near = self._trees[side].query_ball_point(middle, reach + float(own.radius.max()))
+        chosen = np.array(near, dtype=int)
+        chosen = chosen[self._counted[side][chosen]]
+        points = _Points(own.at[chosen], own.radius[chosen]).moved(pose)
         beside = beside_axis(points.at, facing.p0, facing.p1)
         inside = beside <= facing.radius + points.radius
         if not inside.any():
             return chosen[:0]
         most = float(self._sides[1 - side].radius.max())
-        own = points.radius[inside]
-        limit = most + float(own.max())
+        radius = points.radius[inside]
+        limit = most + float(radius.max())
         far, _ = self._trees[1 - side].query(points.at[inside], distance_upper_bound=limit)
-        return np.asarray(chosen[inside][far <= own + most])
+        return np.asarray(chosen[inside][far <= radius + most])
 
     def _times_that_rings_meet(self, q: FloatArray) -> list[IntArray]:
         """In how many postures some point of each ring may meet the other side."""
