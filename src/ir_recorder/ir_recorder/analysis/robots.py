@@ -37,15 +37,18 @@ class RobotDistance:
 
 
 def nearest(one: Analysis, other: Analysis) -> RobotDistance | None:
-    """How near two robots came to each other; None where joint states or a cell are missing."""
-    arms = [_Arm.of(analysis) for analysis in (one, other)]
-    if arms[0] is None or arms[1] is None:
+    """How near two robots came to each other; None where joint states or a cell are missing, or
+    their times do not overlap.
+    """
+    first = _Arm.of(one)
+    second = _Arm.of(other)
+    if first is None or second is None:
         return None
-    low = max(arm.time[0] for arm in arms if arm is not None)
-    high = min(arm.time[-1] for arm in arms if arm is not None)
-    times = max((arm.time for arm in arms if arm is not None), key=len)
+    low = max(first.time[0], second.time[0])
+    high = min(first.time[-1], second.time[-1])
+    times = max(first.time, second.time, key=len)
     times = times[(times >= low) & (times <= high)]
-    found = [_least(arms[0], arms[1], times[k : k + _ROWS]) for k in range(0, len(times), _ROWS)]
+    found = [_least(first, second, times[k : k + _ROWS]) for k in range(0, len(times), _ROWS)]
     return min(found, key=lambda each: each.distance, default=None)
 
 
@@ -94,7 +97,7 @@ class _Arm:
         for part in dict.fromkeys(self.loads[k][1] for k in np.unique(held).tolist()):
             there = np.array([self.loads[k][1] == part for k in held.tolist()])
             for capsule in cell.capsules(part):
-                if capsule.link == 0:
+                if capsule.link == 0:  # a foot is among the machines of the other robot's cell
                     continue
                 frames = poses[:, capsule.link]
                 ends = np.stack([capsule.p0, capsule.p1])
@@ -149,7 +152,9 @@ def _distances(analyses: Mapping[str, Analysis], bounds: Tolerances) -> Iterator
         title = f"distance of {name} and {its_name}"
         found = nearest(one, other)
         if found is None:
-            yield unchecked(title, "joint states or the cell of one of them are missing")
+            yield unchecked(
+                title, "joint states or the cell of one are missing, or their times do not overlap"
+            )
             continue
         kept = [a.safety_distance for a in (one, other) if np.isfinite(a.safety_distance)]
         margin = max(kept, default=bounds.safety_distance)
