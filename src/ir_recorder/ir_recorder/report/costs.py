@@ -449,7 +449,7 @@ def _saved(cycle: Production, costs: Costs) -> list[tuple[str, ...]]:
 def _saving(where: str, saving: Saving, pace: float, costs: Costs) -> tuple[str, ...]:
     word, amount = saved_amount(saving).gain()
     doubt = f"<small>{amount.doubt}</small>" if amount.doubt else ""
-    cells = [f"<b>{kilowatt_hours(amount.value)}</b>{_between(amount, kilowatt_hours)}{doubt}"]
+    cells = [f"<b>{kilowatt_hours(amount.value)}</b>{small_span(amount, kilowatt_hours)}{doubt}"]
     counts = _counts(pace, costs)
     year = costs.money(amount.value * counts[-1])
     for count in counts:
@@ -463,7 +463,8 @@ def _saving(where: str, saving: Saving, pace: float, costs: Costs) -> tuple[str,
     return (f"{word} {where}", *cells)
 
 
-def _between(amount: Amount, show: Callable[[float], str]) -> str:
+def small_span(amount: Amount, show: Callable[[float], str]) -> str:
+    """The interval of an amount in small letters (HTML), "" where it has none."""
     if amount.high <= amount.low:
         return ""
     return f"<small>{text(span_of(amount.low, amount.high, show))}</small>"

@@ -38,6 +38,7 @@ from ir_recorder.report.costs import (
     idle_saving,
     idle_sentence,
     payback,
+    small_span,
     yearly_money,
     yearly_span,
 )
@@ -52,7 +53,6 @@ from ir_recorder.report.number_text import (
     percent,
     seconds,
     significant,
-    span_of,
     text,
     watts,
 )
@@ -603,7 +603,7 @@ def _yearly(amount: Amount, costs: Costs) -> tuple[str, str]:
     """Price of a year, and its energy with interval and CO2."""
     return (
         f"<b>{text(yearly_money(costs.money(amount.value), costs.currency))}</b>",
-        f"<b>{text(kilowatt_hours(amount.value))}</b>{_between(amount, kilowatt_hours)}"
+        f"<b>{text(kilowatt_hours(amount.value))}</b>{small_span(amount, kilowatt_hours)}"
         f"<small>{text(kilograms(costs.co2(amount.value)))} of CO2</small>",
     )
 
@@ -623,12 +623,6 @@ def _saved(amount: Amount | None, costs: Costs) -> str:
 
 def _money_between(amount: Amount, costs: Costs) -> str:
     return yearly_span(costs.money(amount.low), costs.money(amount.high))
-
-
-def _between(amount: Amount, show: Callable[[float], str]) -> str:
-    if amount.high <= amount.low:
-        return ""
-    return f"<small>{text(span_of(amount.low, amount.high, show))}</small>"
 
 
 def _matrix(what: str, found: Mapping[str, Mapping[str, float]], robots: Sequence[Robot]) -> str:
