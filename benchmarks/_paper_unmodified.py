@@ -24,10 +24,9 @@ from _regional_tasks import CELLS, Task, cost_of
 
 from ir_msgs_py.options import PlanOptions
 from ir_planner.request import Context, Work
-from ir_planner.search.correction import corrected
-from ir_planner.search.genetic import Genetic
+from ir_planner.search.genetic_correction import Genetic, corrected
 from ir_planner.service.exit import Exit
-from ir_planner.service.modified_ga import ModifiedGa, withdraw
+from ir_planner.service.stochastic_withdrawal import ModifiedGa, withdraw
 from ir_planner.timing.straight_steps import straight_steps
 from ir_values.arrays import FloatArray
 

@@ -29,8 +29,8 @@ from ir_planner.request import Context, Work
 from ir_planner.scene import path_cost
 from ir_planner.search import fewest_corners
 from ir_planner.service.exit import Exit
-from ir_planner.service.modified_ga import ModifiedGa, withdraw
-from ir_planner.service.withdrawals import ExitTree
+from ir_planner.service.exit_paths import ExitTree
+from ir_planner.service.stochastic_withdrawal import ModifiedGa, withdraw
 from ir_values.arrays import FloatArray
 
 CELLS = ("cnc_door", "deep_box", "demo")

@@ -16,8 +16,8 @@ from _kernels_peers import Coal
 from ir_description.robot import RobotModel
 from ir_kernels import CollisionModel
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.scene.contact_zones import tcp_inside
 from ir_planner.scene.planning_scene import PlanningScene
-from ir_planner.scene.zones import tcp_inside
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 # Coal's distances along a path at 0.0005 rad, asked only where they could be too small.

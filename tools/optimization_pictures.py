@@ -18,7 +18,7 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.energy import movement_energy
 from ir_planner.planner import Planner
 from ir_planner.scene.planning_scene import PlanningScene
-from ir_planner.timing.blending import stretched
+from ir_planner.timing.blended_steps import stretched
 from ir_planner.trajectories.optimization import OptimizationPlan
 
 mpl.use("Agg")

@@ -25,8 +25,8 @@ from ir_planner.configurations.interaction_point import searched_configurations
 from ir_planner.request.context import Context, Journal, Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.service.exit import Exit
-from ir_planner.service.modified_ga import ModifiedGa, Walk, withdraw
 from ir_planner.service.service_movement import ServicePlan, ServiceRequest, plan_service
+from ir_planner.service.stochastic_withdrawal import ModifiedGa, Walk, withdraw
 from ir_values.arrays import FloatArray
 
 mpl.use("Agg")

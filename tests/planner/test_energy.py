@@ -18,7 +18,7 @@ from ir_planner.checks.energy import holding_watts, movement_energy
 from ir_planner.request.context import Context, Work
 from ir_planner.scene import Drives
 from ir_planner.scene.planning_scene import PlanningScene
-from ir_planner.timing.blending import standing, stretched
+from ir_planner.timing.blended_steps import standing, stretched
 from ir_planner.timing.objective import best_stretch, stretched_costs
 from ir_planner.timing.straight_steps import straight_steps
 

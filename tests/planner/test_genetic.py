@@ -30,8 +30,7 @@ from ir_planner.scene.planning_scene import (
     path_cost,
     scene_with,
 )
-from ir_planner.search.correction import colliding_stretch, corrected
-from ir_planner.search.genetic import Genetic
+from ir_planner.search.genetic_correction import Genetic, colliding_stretch, corrected
 from ir_planner.search.population import _Breeder, evolve, path_matrix
 from ir_planner.search.registry import SEARCHES
 from ir_planner.search.variety import evenly, first_different

@@ -24,7 +24,7 @@ from ir_planner.planner import Planner
 from ir_planner.request.context import Work
 from ir_planner.scene.planning_scene import PROOF_TOLERANCE, PlanningScene
 from ir_planner.search import SEARCHES
-from ir_planner.timing.blending import stretched
+from ir_planner.timing.blended_steps import stretched
 from ir_planner.trajectories.optimization import (
     POINTS_MAX,
     OptimizationPlan,

@@ -31,7 +31,7 @@ from ir_planner.optimize.spline_cost import spline_cost
 from ir_planner.regional.regional import MovementPlan
 from ir_planner.request.context import Context, Work
 from ir_planner.scene.planning_scene import PlanningScene
-from ir_planner.timing.blending import stretched
+from ir_planner.timing.blended_steps import stretched
 from ir_planner.timing.movement import TORQUE_SHARES
 from ir_planner.timing.objective import objective_weights
 from ir_planner.timing.spline_timing import time_spline

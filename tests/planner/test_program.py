@@ -24,8 +24,8 @@ from ir_planner.regional.regional import plan_regional
 from ir_planner.request.context import Context, Journal, Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.search.registry import registered
+from ir_planner.service.exit_paths import EXIT_SEARCHES
 from ir_planner.service.service_lines import timed_service
-from ir_planner.service.withdrawals import EXIT_SEARCHES
 from ir_planner.settings import PlannerSettings
 
 

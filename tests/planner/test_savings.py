@@ -23,7 +23,7 @@ from ir_planner.program.station_graph import StationChain
 from ir_planner.program.time_values import Ladder
 from ir_planner.request import Journal, Work
 from ir_planner.search.registry import registered
-from ir_planner.service.withdrawals import EXIT_SEARCHES
+from ir_planner.service.exit_paths import EXIT_SEARCHES
 from ir_planner.settings import PlannerSettings
 from ir_values.arrays import FloatArray
 

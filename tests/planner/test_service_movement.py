@@ -24,7 +24,9 @@ from ir_planner.program.program import ProgramRequest, plan_program
 from ir_planner.request.context import Context, Journal, Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.service.exit import Exit, WorkArea
-from ir_planner.service.modified_ga import (
+from ir_planner.service.exit_paths import exit_searches, withdrawal
+from ir_planner.service.service_movement import ServicePlan, ServiceRequest, plan_service
+from ir_planner.service.stochastic_withdrawal import (
     ExitPopulation,
     ModifiedGa,
     _Walker,
@@ -32,8 +34,6 @@ from ir_planner.service.modified_ga import (
     step_weights,
     withdraw,
 )
-from ir_planner.service.service_movement import ServicePlan, ServiceRequest, plan_service
-from ir_planner.service.withdrawals import exit_searches, withdrawal
 
 IN_ZONES = [
     ("cnc_door", "cnc"),

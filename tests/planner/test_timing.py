@@ -23,7 +23,13 @@ from ir_planner.request.context import Context, Work
 from ir_planner.request.goals import Goal
 from ir_planner.scene.motion_limits import MotionLimits, torque_use
 from ir_planner.scene.planning_scene import PlanningScene
-from ir_planner.timing.blending import TimedPath, blended, largest_overlaps, standing, stretched
+from ir_planner.timing.blended_steps import (
+    TimedPath,
+    blended,
+    largest_overlaps,
+    standing,
+    stretched,
+)
 from ir_planner.timing.objective import best_stretch
 from ir_planner.timing.ptp import fastest, fastest_law
 from ir_planner.timing.spline_timing import time_spline

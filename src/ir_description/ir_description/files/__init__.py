@@ -18,7 +18,7 @@ from ir_description.files.robot_file import (
     robot_from_yaml,
 )
 from ir_description.files.subject_lines import subject_line
-from ir_description.files.urdf import robot_urdf
+from ir_description.files.urdf_writer import robot_urdf
 from ir_values.files import is_path, is_utf16, read_regular_file, text_of
 from ir_values.yaml_tree import plain_yaml
 

@@ -27,8 +27,16 @@ from ir_krl import (
 )
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.trajectory import NS_PER_S, JointTrajectory
+from ir_planner.krl.blended_motions import (
+    AxisLine,
+    AxisPath,
+    Move,
+    move,
+    overlap,
+    tool_curve,
+    trajectory,
+)
 from ir_planner.krl.geometry import Arm
-from ir_planner.krl.motions import AxisLine, AxisPath, Move, move, overlap, tool_curve, trajectory
 from ir_planner.krl.splines import (
     ToolMotion,
     block_curve,

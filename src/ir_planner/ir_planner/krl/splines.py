@@ -22,8 +22,8 @@ from ir_msgs_py.cartesian import (
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.cartesian import Line
 from ir_planner.curves import RotationSpline, turn_of, turned_evenly
+from ir_planner.krl.blended_motions import AxisCurve, drawn_from, followed, through_axes, tool_ends
 from ir_planner.krl.geometry import Arm, tool_in_flange
-from ir_planner.krl.motions import AxisCurve, drawn_from, followed, through_axes, tool_ends
 from ir_planner.scene import PlanningScene, torque_use
 from ir_planner.timing import GRID_NS, GRID_S
 from ir_values.arrays import FloatArray

@@ -8,8 +8,8 @@ import numpy as np
 
 from ir_krl import Switch, Target
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.krl.blended_motions import Move
 from ir_planner.krl.geometry import Arm
-from ir_planner.krl.motions import Move
 from ir_planner.timing import GRID_S
 from ir_values.arrays import FloatArray
 

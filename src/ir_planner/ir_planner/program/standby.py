@@ -198,7 +198,7 @@ class Timeouts:
             costs = self._until(at, rest.watts, rest.leave)
             costs += self._from(at, deeper, rest.watts, rest.bus_off)
             k = int(np.argmin(costs))
-            if self._longer(at)[k] and costs[k] < least:
+            if self._going_on_after(at)[k] and costs[k] < least:
                 least = costs[k]
                 best = RestStep(deeper, float(at[k]))
         return best
@@ -211,20 +211,20 @@ class Timeouts:
     def _sums(self) -> FloatArray:
         return np.concatenate(([0.0], np.cumsum(self.lengths)))
 
-    def _shorter(self, times: FloatArray) -> FloatArray:
+    def _ended_by(self, times: FloatArray) -> FloatArray:
         """How many pauses end at each time or before."""
         return np.searchsorted(self.lengths, times, side="right").astype(np.float64)
 
-    def _longer(self, times: FloatArray) -> FloatArray:
-        return len(self.lengths) - self._shorter(times)
+    def _going_on_after(self, times: FloatArray) -> FloatArray:
+        return len(self.lengths) - self._ended_by(times)
 
     def _until(self, times: FloatArray, watts: float, leave: float) -> FloatArray:
         """Energy of all pauses in one mode from time 0 until each of these times, and back to
         motors of those that end before; differences of two times are the energy between them.
         """
-        ended = self._shorter(times)
+        ended = self._ended_by(times)
         lengths = self._sums[ended.astype(np.intp)]
-        staying = watts * (lengths + self._longer(times) * times)
+        staying = watts * (lengths + self._going_on_after(times) * times)
         back: FloatArray = ended * (self.rests.motors * leave)
         return staying + back
 
@@ -233,11 +233,11 @@ class Timeouts:
         from one that draws `watts`, until the robot is ready; was_off: whether the drive bus is off
         before.
         """
-        longer = self._longer(times)
+        longer = self._going_on_after(times)
         free = times + rest.busy
         switched = self.switched_off if rest.bus_off and not was_off else 0.0
         entering = longer * (watts * rest.enter + rest.watts * rest.stay + switched)
-        early = (longer - self._longer(free)) * (self.rests.motors * rest.leave)
+        early = (longer - self._going_on_after(free)) * (self.rests.motors * rest.leave)
         return entering + early + self._after(free, rest)
 
     def _after(self, free: FloatArray, rest: Rest) -> FloatArray:
@@ -251,7 +251,7 @@ class Timeouts:
         best = np.minimum(at_samples, self._onward(free, rest)) - self._until(
             free, rest.watts, rest.leave
         )
-        return np.where(self._longer(free) > 0, best, 0.0)
+        return np.where(self._going_on_after(free) > 0, best, 0.0)
 
     def _onward(self, times: FloatArray, rest: Rest) -> FloatArray:
         """Energy in the mode from time 0 until each of these times, then deeper; the last: to the
@@ -261,7 +261,7 @@ class Timeouts:
         options = [
             self._from(times, deeper, rest.watts, rest.bus_off) for deeper in self._deeper(rest)
         ]
-        nobody = self._longer(times) == 0
+        nobody = self._going_on_after(times) == 0
         onward: FloatArray = np.min(options, axis=0) if options else np.full(len(times), np.inf)
         return staying + np.where(nobody, 0.0, onward)
 

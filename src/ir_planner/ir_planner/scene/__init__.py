@@ -3,6 +3,7 @@ W.
 """
 
 from ir_planner.scene.actuators import LinkVoltage
+from ir_planner.scene.contact_zones import polynomials_between, spans_outside, tcp_inside
 from ir_planner.scene.motion_limits import STILL, Dynamics, MotionLimits, lasting_longer, torque_use
 from ir_planner.scene.planning_scene import (
     CENTRE_STEP,
@@ -20,7 +21,6 @@ from ir_planner.scene.planning_scene import (
 )
 from ir_planner.scene.tool_bounds import PointBounds, ToolBounds
 from ir_planner.scene.tool_cone import TILT_TOLERANCE, ToolCone
-from ir_planner.scene.zones import polynomials_between, spans_outside, tcp_inside
 
 __all__ = [
     "CENTRE_STEP",

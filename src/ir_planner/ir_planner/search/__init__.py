@@ -1,6 +1,6 @@
 """Searches for free paths between configurations: one port, one file each, one registry."""
 
-from ir_planner.search.correction import correction_log
+from ir_planner.search.genetic_correction import correction_log
 from ir_planner.search.guesses import guesses
 from ir_planner.search.port import Ends, Found, Search, keeps_upright, quick, repeatable
 from ir_planner.search.registry import SEARCHES, not_installed, registered

@@ -10,7 +10,6 @@ from typing import Protocol, runtime_checkable
 
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
-from ir_planner.search.correction import Correction
 from ir_values.arrays import FloatArray
 
 
@@ -20,6 +19,34 @@ class Ends:
 
     start: FloatArray
     goals: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A stretch that collided, between its free ends begin and end (n,), and the fitness of the
+    best individual of every generation that was bred for it; the straight stretch's cost counts 1.
+    """
+
+    begin: FloatArray
+    end: FloatArray
+    fitness: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """Paths (M_k, n) of certified straight steps, cheapest by W first.
+
+    Without one: the best individual of a stretch that was given up lacked `shortfall` m of what
+    pair `pair` must keep, at `q` (n,); pair -1: there was none. generations: of all populations
+    together. stretches: those that were corrected, in order.
+    """
+
+    paths: list[FloatArray]
+    shortfall: float
+    pair: int
+    q: FloatArray
+    generations: int
+    stretches: tuple[Stretch, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

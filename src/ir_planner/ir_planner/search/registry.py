@@ -12,7 +12,7 @@ from ir_planner.checks import FreeSpace
 from ir_planner.errors import RequestError
 from ir_planner.request import Work
 from ir_planner.search.detours import Detours, Direct, Retract
-from ir_planner.search.genetic import Genetic
+from ir_planner.search.genetic_correction import Genetic
 from ir_planner.search.port import Ends, Found, Search
 from ir_planner.search.sbl import Sbl
 from ir_planner.search.tree import Tree

@@ -1,7 +1,13 @@
 """Service movements: straight lines at a station, and the withdrawal from a machine (eq. 7)."""
 
 from ir_planner.service.exit import Exit, ExitSearch, ExitsFound, WorkArea
-from ir_planner.service.modified_ga import ModifiedGa
+from ir_planner.service.exit_paths import (
+    EXIT_SEARCHES,
+    ExitPath,
+    exit_searches,
+    known_method,
+    withdrawal,
+)
 from ir_planner.service.service_lines import (
     ServiceLine,
     line_poses,
@@ -16,13 +22,7 @@ from ir_planner.service.service_movement import (
     plan_service,
     service_shapes,
 )
-from ir_planner.service.withdrawals import (
-    EXIT_SEARCHES,
-    ExitPath,
-    exit_searches,
-    known_method,
-    withdrawal,
-)
+from ir_planner.service.stochastic_withdrawal import ModifiedGa
 
 __all__ = [
     "EXIT_SEARCHES",

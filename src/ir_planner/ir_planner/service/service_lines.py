@@ -18,7 +18,7 @@ from ir_planner.errors import TimingError
 from ir_planner.optimize import QUICK_TIMING, movement_over, rescaled
 from ir_planner.request import Context
 from ir_planner.scene import MotionLimits
-from ir_planner.service.withdrawals import ExitPath
+from ir_planner.service.exit_paths import ExitPath
 from ir_planner.timing import (
     Movement,
     best_stretch,

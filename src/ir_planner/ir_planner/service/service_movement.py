@@ -25,7 +25,7 @@ from ir_planner.presentation import in_mm, plot_trajectory, result_text
 from ir_planner.request import Context, Journal
 from ir_planner.scene import PlanningScene
 from ir_planner.service.exit import Exit, ExitSearch
-from ir_planner.service.withdrawals import (
+from ir_planner.service.exit_paths import (
     EXIT_SEARCHES,
     ExitPath,
     Withdrawal,

@@ -1,7 +1,7 @@
 """Time scaling: seven-phase laws, straight movements (PTP), blended corners, the best duration."""
 
 from ir_planner.timing.baseline import baseline, baseline_costs_at_least
-from ir_planner.timing.blending import TimedPath, blended, standing, stretched
+from ir_planner.timing.blended_steps import TimedPath, blended, standing, stretched
 from ir_planner.timing.movement import TORQUE_SHARES, Movement, within_torque
 from ir_planner.timing.objective import (
     DURATION_SLACK,

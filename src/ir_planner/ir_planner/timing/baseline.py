@@ -10,7 +10,7 @@ import numpy as np
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.request import Context
 from ir_planner.scene import STILL, MotionLimits
-from ir_planner.timing.blending import TimedPath, blended, stretched
+from ir_planner.timing.blended_steps import TimedPath, blended, stretched
 from ir_planner.timing.movement import Movement, within_torque
 from ir_planner.timing.objective import (
     DURATION_SLACK,

@@ -27,7 +27,7 @@ from ir_planner.checks import (
 )
 from ir_planner.request import Context
 from ir_planner.scene import MotionLimits
-from ir_planner.timing.blending import stretched
+from ir_planner.timing.blended_steps import stretched
 from ir_planner.timing.objective import coarse_cost, coarse_energy_cost, request_cost
 from ir_values.arrays import FloatArray
 

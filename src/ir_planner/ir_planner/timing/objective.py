@@ -19,7 +19,7 @@ from ir_planner.curves import motion_at
 from ir_planner.errors import RequestError
 from ir_planner.request import DURATION_MAX, Context
 from ir_planner.scene import PlanningScene, path_cost
-from ir_planner.timing.blending import stretched
+from ir_planner.timing.blended_steps import stretched
 from ir_values.arrays import FloatArray
 
 _FACTORS = np.array([1.0, 1.04, 1.1, 1.18, 1.3, 1.5, 1.8, 2.2])

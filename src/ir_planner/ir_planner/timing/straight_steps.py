@@ -17,7 +17,7 @@ from ir_planner.checks import SLACK, Violation, clearance_violation, tilt_violat
 from ir_planner.curves import extremes
 from ir_planner.request import Context
 from ir_planner.scene import STILL, Dynamics, MotionLimits, lasting_longer, torque_use
-from ir_planner.timing.blending import TimedPath, blended, largest_overlaps, standing
+from ir_planner.timing.blended_steps import TimedPath, blended, largest_overlaps, standing
 from ir_planner.timing.movement import Movement, within_torque
 from ir_planner.timing.objective import at_best_duration, coarse_energy_cost
 from ir_planner.timing.ptp import fastest, fastest_law, torque_per_segment

@@ -2,6 +2,7 @@
 by.
 """
 
+from ir_sim_driver.plc.emergency_stop import StopMachine, StopState
 from ir_sim_driver.plc.inputs import (
     BITS,
     LINKS,
@@ -19,7 +20,6 @@ from ir_sim_driver.plc.inputs import (
     usable_links,
 )
 from ir_sim_driver.plc.port import STOP_BIT, Controller, Link, OpenLink, Readout
-from ir_sim_driver.plc.stop import StopMachine, StopState
 from ir_sim_driver.plc.wake_listener import WakeOnLan
 
 __all__ = [

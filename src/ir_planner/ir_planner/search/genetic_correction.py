@@ -16,41 +16,41 @@ from ir_kernels import portable
 from ir_kernels.collision import FREE, Certificates
 from ir_msgs_py.search_log import CorrectionLog
 from ir_planner.checks import FreeSpace, first_too_near
+from ir_planner.request import Work
 from ir_planner.scene import PlanningScene, path_cost
 from ir_planner.search.population import SAMPLES_MAX, Evolution, GeneticSettings, batch_work, evolve
-from ir_planner.search.variety import evenly, first_different
+from ir_planner.search.port import Correction, Ends, Found, Stretch
+from ir_planner.search.variety import NEAREST_GOALS, evenly, first_different
 from ir_values.arrays import FloatArray, IntArray
 
 _SPACING = 0.02  # rad between samples of a path in search of what collides
 _WIDER = 4.0  # by how much each further attempt widens the margin
 
 
-@dataclass(frozen=True, eq=False)
-class Stretch:
-    """A stretch that collided, between its free ends begin and end (n,), and the fitness of the
-    best individual of every generation that was bred for it; the straight stretch's cost counts 1.
-    """
+@dataclass(frozen=True)
+class Genetic(GeneticSettings):
+    """The straight movement with what collides corrected by a population (eqs. 9, 10)."""
 
-    begin: FloatArray
-    end: FloatArray
-    fitness: tuple[float, ...]
+    def quick(self) -> "Genetic":
+        """Each stretch is tried once."""
+        return replace(self, attempts=1)
 
-
-@dataclass(frozen=True, eq=False)
-class Correction:
-    """Paths (M_k, n) of certified straight steps, cheapest by W first.
-
-    Without one: the best individual of a stretch that was given up lacked `shortfall` m of what
-    pair `pair` must keep, at `q` (n,); pair -1: there was none. generations: of all populations
-    together. stretches: those that were corrected, in order.
-    """
-
-    paths: list[FloatArray]
-    shortfall: float
-    pair: int
-    q: FloatArray
-    generations: int
-    stretches: tuple[Stretch, ...] = ()
+    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+        """Correct the straight movement to the nearest goal that it succeeds for."""
+        rng = np.random.default_rng(seed)
+        nearest: tuple[float, str] = (np.inf, "")
+        for goal in ends.goals[:NEAREST_GOALS]:
+            found = corrected(ends.start, goal, space, self, rng)
+            if found.paths:
+                return Found(found.paths, correction=found)
+            if found.pair >= 0 and found.shortfall < nearest[0]:
+                pair = space.scene.collision.pairs[found.pair]
+                sentence = (
+                    f"the nearest of {found.generations} generations lacks "
+                    f"{found.shortfall * 1e3:.1f} mm between {pair.body_a} and {pair.body_b}"
+                )
+                nearest = (found.shortfall, sentence)
+        return Found([], nearest[1])
 
 
 def corrected(

@@ -311,8 +311,8 @@ def _excess(made: Move, limits: MotionLimits, scene: PlanningScene) -> float:
 
 # Moves that follow each other without a stop: the next begins while the last one brakes.
 #
-# As `timing.blending` does for straight steps: q(t) is the sum of what the moves have covered, so
-# that the arm cuts the corner. Moves that are blended have half the jerk each, so that both
+# As `timing.blended_steps` does for straight steps: q(t) is the sum of what the moves have covered,
+# so that the arm cuts the corner. Moves that are blended have half the jerk each, so that both
 # together keep the limit. How early the next may begin follows from the approximation distance:
 # what is left of the one and what the other has covered stay within it, and within half of each
 # move.

@@ -18,7 +18,7 @@ from ir_planner.request import Journal, Work
 from ir_planner.scene import path_cost
 from ir_planner.search import EXIT, connect, fewest_corners, first_different
 from ir_planner.service.exit import Exit, ExitSearch, ExitsFound
-from ir_planner.service.modified_ga import ModifiedGa
+from ir_planner.service.stochastic_withdrawal import ModifiedGa
 from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError
 from ir_values.extensions import Registry
