@@ -88,16 +88,16 @@ def pairs_of(
     groups: dict[tuple[int, int], list[int]] = {}
     for z, (_, first, second) in enumerate(model.pairs):
         if float((distance[:, z] <= SAFETY).mean()) > NEAR:
-            links = sorted((named[first].link, named[second].link))
-            groups.setdefault((links[0], links[1]), []).append(z)
+            one, other = sorted((named[first].link, named[second].link))
+            groups.setdefault((one, other), []).append(z)
     reduced = []
     unclear: set[int] = set()
     for links, near in groups.items():
         own = []
         for z in near:
             pair = (named[name] for name in model.pairs[z][1:])
-            one, other = sorted(pair, key=lambda each: each.link)
-            own.append(_own_distance(distance[:, z], _Meeting(chain, one, other, surfaces, q)))
+            lower, upper = sorted(pair, key=lambda each: each.link)
+            own.append(_own_distance(distance[:, z], _Meeting(chain, lower, upper, surfaces, q)))
         kept = np.array([each for each, _ in own])
         left = float((distance[:, near] > kept).all(axis=1).mean())
         free_at_home = home is None or (model.distances(home[None])[0, near] > kept).all()

@@ -70,7 +70,8 @@ class Recharge:
 
     def joules(self, seconds: _Seconds) -> _Seconds:
         """After so long, begun at the mains' voltage."""
-        return -self.whole * np.expm1(-self.rate * seconds)
+        joules: _Seconds = -self.whole * np.expm1(-self.rate * seconds)
+        return joules
 
     def begun_higher(self, seconds: float, stored: float) -> tuple[float, float]:
         """After so long, begun with `stored` J above the mains' voltage; and what is left of
