@@ -6,6 +6,7 @@ import base64
 import csv
 import io
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -22,7 +23,7 @@ from ir_recorder.analysis.production import production_of
 from ir_recorder.report.charts import COLOURS, MARKS, Point, front_chart, front_section, pareto
 from ir_recorder.report.compare import _WITH_PAUSES, comparison_html
 from ir_recorder.report.headline import source
-from ir_recorder.report.number_text import joules, seconds
+from ir_recorder.report.number_text import joules, kilowatt_hours, seconds
 from ir_recorder.report.page import asset
 from ir_recorder.report.step_table import step_columns, write_table
 from ir_recorder.report_main import main
@@ -176,7 +177,7 @@ def test_plans_that_were_not_driven_are_compared_by_what_was_predicted(analysis:
     plan = analyse(replace(bare, path=Path("plan.mcap")))
     page = page_of(plan, plan)
     assert page.count("predicted, not driven") == 2
-    assert "3 800 J" in page
+    assert "1.06 Wh" in page
     cycle = production_of(plan)
     assert cycle is not None
     assert (cycle.energy, cycle.seconds) == (3800.0, 5.7)
@@ -200,7 +201,7 @@ def test_a_run_with_short_pauses_is_no_share_of_one_at_full_length(analysis: Ana
         assert "pauses shortened" in row[0]
         assert "%" not in row[0]
     if cycle is not None:
-        assert f"s {seconds(cycle.seconds)}, {joules(cycle.energy)}" in page
+        assert f"s {seconds(cycle.seconds)}, {kilowatt_hours(cycle.energy)}" in page
     assert "+10.00 %" in page_of(short, _dearer(short))
 
 
@@ -218,15 +219,18 @@ def test_the_run_stands_beside_the_common_program(analysis: Analysis) -> None:
     st.floats(1e-3, 1e4),
     st.floats(10.0, 1e7),
     st.floats(1e-3, 1e6),
+    st.sampled_from((joules, kilowatt_hours)),
 )
 def test_no_two_ticks_of_an_axis_read_alike(
-    seconds: float, longer: float, energy: float, more: float
+    seconds: float, longer: float, energy: float, more: float, show: Callable[[float], str]
 ) -> None:
     """Once 33.6, 33.6, 33.6, 33.7, 33.7 min."""
     points = [Point("a", seconds, energy + more, "x"), Point("b", seconds + longer, energy, "x")]
-    drawn = front_chart(points)
+    drawn = front_chart(points, show=show)
     for anchor in ("middle", "end"):
-        ticks = re.findall(rf'text-anchor="{anchor}">(-?[\d .]+ (?:s|min|J|kJ))</text>', drawn)
+        ticks = re.findall(
+            rf'text-anchor="{anchor}">(-?[\d .]+ (?:s|min|J|kJ|Wh|kWh))</text>', drawn
+        )
         assert len(ticks) >= 2
         assert len(set(ticks)) == len(ticks)
 

@@ -101,4 +101,4 @@ def test_a_plan_has_one_row_of_tiles_and_no_part_is_lost(analysis: Analysis) -> 
     shown = tiles(not_driven(analysis))
     assert shown.count('class="tile"') <= 5
     for part in ("movements", "pauses"):
-        assert re.search(rf"<small>{part} [\d ]+ J in [\d.]+ s</small>", shown), part
+        assert re.search(rf"<small>{part} [\d.]+ Wh in [\d.]+ s</small>", shown), part

@@ -81,8 +81,7 @@ class DemoOutcome:
             self._saved(),
             *self.analysis.problems,
         ]
-        parts += [check_sentence(check) for check in self.checks if not check.ok]
-        parts.append(f"checks: {summary(self.checks)[1]}")
+        parts += check_lines(self.checks)
         return "\n\n".join(part for part in parts if part)
 
     def _cycle(self) -> str:
@@ -174,7 +173,17 @@ def _total(energy: float, seconds: float) -> str:
     return f"{energy / 1000.0:.1f} kJ ({energy / 3600.0:.1f} Wh) in {seconds:.1f} s"
 
 
-def check_sentence(check: Finding) -> str:
+def check_lines(checks: Sequence[Finding]) -> list[str]:
+    """Every check that does not hold in words, and the verdict with their names: the last line says
+    which.
+    """
+    wrong = [check for check in checks if not check.ok]
+    names = ", ".join(check.name for check in wrong)
+    verdict = f"checks: {summary(tuple(checks))[1]}"
+    return [*map(_check_sentence, wrong), f"{verdict}: {names}" if wrong else verdict]
+
+
+def _check_sentence(check: Finding) -> str:
     """A check that does not hold, in words."""
     allowed = interval(check.low, check.high, check.unit)
     note = f" ({check.note})" if check.note else ""

@@ -22,7 +22,7 @@ from ir_cli.ros.demo import (
     START_SECONDS,
     Tended,
     await_services,
-    check_sentence,
+    check_lines,
     finish_recording,
     naming_the_dead,
 )
@@ -96,8 +96,7 @@ class RobotsOutcome:
         header = ["robot", "steps", "s", "J simulated", "J predicted", "s waited for signals"]
         parts = [table(header, rows), self.failed]
         parts += [problem for analysis in every for problem in analysis.problems]
-        parts += [check_sentence(check) for check in self.all_checks if not check.ok]
-        parts.append(f"checks: {summary(self.all_checks)[1]}")
+        parts += check_lines(self.all_checks)
         return "\n\n".join(part for part in parts if part)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -18,7 +18,9 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_planner import CancelledError, Goal, Planner, PlannerError
 from ir_planner.before_after import before_after_common
+from ir_recorder.analysis.production import planned_share
 from ir_recorder.report.costs import Costs
+from ir_recorder.report.number_text import kilowatt_hours, seconds
 from ir_recorder.report.program_comparison import (
     assumptions,
     basis_section,
@@ -204,8 +206,8 @@ class PlanWorker:
             )
             if not plan.status.ok:
                 return Planned(None, failure=plan.status.message)
-            moving, _, *others = sentences_of(plan, planner)
-            lines = (moving, *others[:-1])  # the cycle stands in figures; what is saved, compared
+            others = sentences_of(plan, planner)[2:-1]  # totals are figures; the saving: compared
+            lines = (_parts(plan.movements), *others)
             return Planned(motion_of(plan.movements, cell), lines, report=plan.report)
         movements = []
         failures = []
@@ -267,3 +269,13 @@ def _tasks(
 
 def _raise(error: BaseException) -> None:
     raise error
+
+
+def _parts(steps: Sequence[PlannedMovement]) -> str:
+    """Time and energy of the movements and of the pauses, in the units of the page."""
+    shares = [planned_share(steps, part) for part in ("movements", "pauses")]
+    return "; ".join(
+        f"{own.name} {seconds(own.seconds)}, {kilowatt_hours(own.energy)}"
+        for own in shares
+        if own is not None
+    )

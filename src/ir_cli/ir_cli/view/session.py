@@ -32,7 +32,13 @@ from ir_recorder.live.server import Answer, LiveServer, Site
 from ir_recorder.live.stream import Stream
 from ir_recorder.report.cell_scene import matrix
 from ir_recorder.report.data import page_content
-from ir_recorder.report.number_text import joules, kilowatt_hours, millimetres, seconds, watts
+from ir_recorder.report.number_text import (
+    kilowatt_hours,
+    millimetres,
+    seconds,
+    span_of,
+    watts,
+)
 from ir_recorder.report.series import Json
 from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError, one_line
@@ -390,7 +396,7 @@ class Session:
         energy = program.whole.energy if program is not None else analysis.energy
         length = program.whole.seconds if program is not None else analysis.seconds
         tiles: list[Json] = [
-            ["this run", kilowatt_hours(energy), f"{joules(energy)} in {seconds(length)}"],
+            ["this run", kilowatt_hours(energy), f"in {seconds(length)}"],
             ["peak power", watts(analysis.peak_power), "of a 10 ms reading"],
         ]
         kind = "Simulated, not measured" if recording.origin == "simulated" else "Measured"
@@ -541,10 +547,10 @@ def _access(each: StationAccess) -> list[Json]:
 
 def _tiles(report: TrajectoryReport) -> list[Json]:
     """The figures of a plan, as every page has them."""
-    within = f"90 % interval {joules(report.energy_low)} to {joules(report.energy_high)}"
+    within = span_of(report.energy_low, report.energy_high, kilowatt_hours)
     return [
         ["cycle", seconds(report.duration), "planned"],
-        ["energy a cycle", kilowatt_hours(report.energy), f"{joules(report.energy)}, {within}"],
+        ["energy a cycle", kilowatt_hours(report.energy), f"90 % interval {within}"],
         ["peak power", watts(report.peak_power), "at the mains, predicted"],
         ["least clearance", millimetres(report.min_clearance), "without pairs that may touch"],
         [

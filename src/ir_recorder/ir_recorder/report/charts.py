@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ir_msgs_py.savings import ProgramPoint
 from ir_recorder.analysis import Analysis, StepResult
-from ir_recorder.report.number_text import joules, seconds, text
+from ir_recorder.report.number_text import joules, kilowatt_hours, seconds, text
 
 # Bars of joules per movement: what consumers took right of zero, what braking axes gave left of
 # it.
@@ -177,6 +177,13 @@ _HALF = 4.0
 # span of an axis: what differs by less reads alike
 _LEAST_S = 0.05
 _LEAST_J = 5.0
+# unit of an axis by its largest value, as number_text writes the same: from which value [SI] on
+# it is the larger one
+_SECONDS = (600.0, ("min", 60.0), ("s", 1.0))
+_ENERGIES = {
+    joules: (10_000.0, ("kJ", 1e3), ("J", 1.0)),
+    kilowatt_hours: (36_000.0, ("kWh", 3.6e6), ("Wh", 3600.0)),
+}
 
 
 @dataclass(frozen=True)
@@ -229,20 +236,23 @@ def pareto(points: Sequence[Point]) -> list[Point]:
     return best
 
 
-def front_chart(points: Sequence[Point], along: str = "cycle time") -> str:
-    """The drawing as SVG, its axis named `along`; "" for fewer than two points."""
+def front_chart(
+    points: Sequence[Point], along: str = "cycle time", show: Callable[[float], str] = joules
+) -> str:
+    """The drawing as SVG, its axis named `along`, its energies in the units of `show` (`joules` or
+    `kilowatt_hours`); "" for fewer than two points.
+    """
     if len(points) < 2:
         return ""
     times = [p.seconds for p in points]
     energies = [p.energy for p in points]
-    x = _Axis(min(times), max(times), _LEAST_S, _LEFT, WIDTH - _RIGHT)
-    y = _Axis(min(energies), max(energies), _LEAST_J, HEIGHT - _BOTTOM, _TOP)
+    x = _Axis(min(times), max(times), _LEAST_S, _LEFT, WIDTH - _RIGHT, *_unit(times, _SECONDS))
+    unit = _unit(energies, _ENERGIES[show])
+    y = _Axis(min(energies), max(energies), _LEAST_J, HEIGHT - _BOTTOM, _TOP, *unit)
     line = " ".join(f"{x.at(p.seconds):.1f},{y.at(p.energy):.1f}" for p in pareto(points))
     heights = _heights(points, x, y)
-    marks = "".join(_mark_front(point, k, heights[k], x, y) for k, point in enumerate(points))
-    said = "; ".join(
-        f"{p.name} {seconds(p.seconds)}, {joules(p.energy)}, {p.source}" for p in points
-    )
+    marks = "".join(_mark_front(point, k, heights[k], x, y, show) for k, point in enumerate(points))
+    said = "; ".join(f"{p.name} {seconds(p.seconds)}, {show(p.energy)}, {p.source}" for p in points)
     return (
         '<div class="figure"><svg class="front" id="energy_over_cycle_time" '
         f'viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{text(said)}">'
@@ -250,15 +260,24 @@ def front_chart(points: Sequence[Point], along: str = "cycle time") -> str:
     )
 
 
+def _unit(
+    values: Sequence[float], units: tuple[float, tuple[str, float], tuple[str, float]]
+) -> tuple[str, float]:
+    since, large, small = units
+    return large if max(map(abs, values)) >= since else small
+
+
 @dataclass(frozen=True)
 class _Axis:
-    """From values to drawing units, with a margin of a tenth."""
+    """From values to drawing units, with a margin of a tenth; labels are multiples of a unit."""
 
     low: float
     high: float
     least: float
     start: float
     end: float
+    unit: str
+    scale: float
 
     @property
     def span(self) -> float:
@@ -273,22 +292,27 @@ class _Axis:
     def at(self, value: float) -> float:
         return self.start + (value - self.first) / (1.2 * self.span) * (self.end - self.start)
 
-    def ticks(self) -> list[float]:
-        step = tick_step(1.2 * self.span)
-        first = math.ceil(self.first / step)
-        last = math.floor((self.first + 1.2 * self.span) / step)
-        return [k * step for k in range(first, last + 1)]
+    def ticks(self) -> dict[float, str]:
+        """Where lines stand, with their labels: as many decimals as their step needs."""
+        step = tick_step(1.2 * self.span / self.scale)
+        first = math.ceil(self.first / self.scale / step)
+        last = math.floor((self.first + 1.2 * self.span) / self.scale / step)
+        decimals = max(0, math.ceil(-math.log10(step) - 1e-9))
+        return {
+            k * step * self.scale: f"{k * step:,.{decimals}f} {self.unit}".replace(",", " ")
+            for k in range(first, last + 1)
+        }
 
 
 def _grid(x: _Axis, y: _Axis, along: str) -> str:
     right = WIDTH - _RIGHT
     bottom = HEIGHT - _BOTTOM
     parts = []
-    for value, shown in zip(y.ticks(), _energies(y.ticks()), strict=True):
+    for value, shown in y.ticks().items():
         at = y.at(value)
         parts.append(f'<path class="grid" d="M{_LEFT:g} {at:.1f}H{right:g}"/>')
         parts.append(f'<text x="{_LEFT - 8:g}" y="{at + 4:.1f}" text-anchor="end">{shown}</text>')
-    for value, shown in zip(x.ticks(), _times(x.ticks()), strict=True):
+    for value, shown in x.ticks().items():
         at = x.at(value)
         parts.append(f'<path class="grid" d="M{at:.1f} {_TOP:g}V{bottom:g}"/>')
         parts.append(f'<text x="{at:.1f}" y="{bottom + 18:g}" text-anchor="middle">{shown}</text>')
@@ -297,36 +321,6 @@ def _grid(x: _Axis, y: _Axis, along: str) -> str:
         "".join(parts)
         + f'<text x="{middle:g}" y="{HEIGHT - 6:g}" text-anchor="middle">{along}</text>'
     )
-
-
-_MINUTE = 60.0  # s
-_KILO = 1e3
-
-
-def _times(ticks: Sequence[float]) -> list[str]:
-    """Labels of an axis [s]: in minutes where it spans some, with as many decimals as its step."""
-    step = _step(ticks)
-    if step >= _MINUTE:
-        return _labels(ticks, step, _MINUTE, "min")
-    return _labels(ticks, step, 1.0, "s")
-
-
-def _energies(ticks: Sequence[float]) -> list[str]:
-    """Labels of an axis [J], with as many decimals as its step."""
-    step = _step(ticks)
-    most = max(map(abs, ticks), default=0.0)
-    return (
-        _labels(ticks, step, _KILO, "kJ") if most >= 10.0 * _KILO else _labels(ticks, step, 1, "J")
-    )
-
-
-def _step(ticks: Sequence[float]) -> float:
-    return ticks[1] - ticks[0] if len(ticks) > 1 else 1.0
-
-
-def _labels(ticks: Sequence[float], step: float, scale: float, unit: str) -> list[str]:
-    decimals = max(0, math.ceil(-math.log10(step / scale) - 1e-9))
-    return [f"{tick / scale:,.{decimals}f} {unit}".replace(",", " ") for tick in ticks]
 
 
 def _heights(points: Sequence[Point], x: _Axis, y: _Axis) -> list[float]:
@@ -351,11 +345,13 @@ def _heights(points: Sequence[Point], x: _Axis, y: _Axis) -> list[float]:
     return heights
 
 
-def _mark_front(point: Point, index: int, label: float, x: _Axis, y: _Axis) -> str:
+def _mark_front(
+    point: Point, index: int, label: float, x: _Axis, y: _Axis, show: Callable[[float], str]
+) -> str:
     at = x.at(point.seconds)
     high = y.at(point.energy)
     name = point.name or "program of the front"
-    words = f"{name}, {point.source}: {seconds(point.seconds)}, {joules(point.energy)}"
+    words = f"{name}, {point.source}: {seconds(point.seconds)}, {show(point.energy)}"
     title = f"<title>{text(words)}</title>"
     if point.source == "predicted":
         drawn = f'<circle class="hollow" cx="{at:.1f}" cy="{high:.1f}" r="6">{title}</circle>'

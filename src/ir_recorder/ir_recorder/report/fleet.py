@@ -646,7 +646,7 @@ def _row(name: str, own: Mapping[str, float], robots: Sequence[Robot]) -> tuple[
     shown = [own.get(robot.name) for robot in robots[:_COLUMNS]]
     if len(robots) > _COLUMNS:
         shown.append(sum(own.get(robot.name, 0.0) for robot in robots[_COLUMNS:]))
-    cells = ("" if value is None else text(kilowatt_hours(value)) for value in shown)
+    cells = (DASH if value is None else text(kilowatt_hours(value)) for value in shown)
     return (text(_shown(name)), *cells, f"<b>{text(kilowatt_hours(sum(own.values())))}</b>")
 
 

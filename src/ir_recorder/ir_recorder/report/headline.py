@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
@@ -72,7 +72,7 @@ def subtitle(analysis: Analysis) -> str:
     start = started(recording)
     version = recording.fact(VERSION)
     supply = f"({DRIVES_ONLY})" if drives_only(analysis) else "at the mains"
-    length = f", recorded {seconds(recording.duration)}, {joules(analysis.energy)} {supply}"
+    length = f", recorded {seconds(recording.duration)}, {kilowatt_hours(analysis.energy)} {supply}"
     if recording.never_driven:
         length = ""
     return text(
@@ -179,7 +179,7 @@ def run_tiles(analysis: Analysis) -> str:
     if program is None:
         return ""
     parts = _parts(program, analysis.recording.origin)
-    own = _html([_whole(analysis, program), *parts, _clearance(analysis)])
+    own = _html([_whole(analysis, program, joules), *parts, _clearance(analysis)])
     return (
         '<details class="part"><summary><h2>This run in figures</h2></summary>'
         f'<div class="tiles">{own}</div></details>'
@@ -201,11 +201,11 @@ def _planned(analysis: Analysis) -> list[Tile]:
         why = _says(one_sided(whole.energy, *within)) if within is not None else ""
         parts = (planned_share(steps, part) for part in ("movements", "pauses"))
         own = [
-            f"{found.name} {joules(found.energy)} in {seconds(found.seconds)}"
+            f"{found.name} {kilowatt_hours(found.energy)} in {seconds(found.seconds)}"
             for found in parts
             if found is not None
         ]
-        said = f"{joules(whole.energy)} in {seconds(whole.seconds)}, predicted"
+        said = f"in {seconds(whole.seconds)}, predicted"
         tiles.append(
             Tile("planned program", kilowatt_hours(whole.energy), (said, *own, spread, why))
         )
@@ -219,11 +219,13 @@ def _planned(analysis: Analysis) -> list[Tile]:
 def _recorded(analysis: Analysis) -> Tile:
     note = f"mean {watts(analysis.mean_power)} over {seconds(analysis.seconds)}"
     if drives_only(analysis):
-        return Tile("energy", joules(analysis.energy), (note, DRIVES_ONLY))
-    return Tile("energy at the mains", joules(analysis.energy), (note,))
+        return Tile("energy", kilowatt_hours(analysis.energy), (note, DRIVES_ONLY))
+    return Tile("energy at the mains", kilowatt_hours(analysis.energy), (note,))
 
 
-def _whole(analysis: Analysis, program: ProgramTotals) -> Tile:
+def _whole(
+    analysis: Analysis, program: ProgramTotals, show: Callable[[float], str] = kilowatt_hours
+) -> Tile:
     whole = program.whole
     shortened = program.unshortened is not None
     _, planned = driven_and_predicted(analysis)
@@ -231,22 +233,22 @@ def _whole(analysis: Analysis, program: ProgramTotals) -> Tile:
     name = "program, one cycle" if whole_cycle else "program, not driven to its end"
     return Tile(
         "this run, pauses shortened" if shortened else name,
-        kilowatt_hours(whole.energy),
+        show(whole.energy),
         (
-            f"{joules(whole.energy)} in {seconds(whole.seconds)}",
-            f"predicted {joules(planned)}{_within(analysis)}, "
+            f"in {seconds(whole.seconds)}",
+            f"predicted {show(planned)}{_within(analysis, show)}, "
             f"{_against(whole.energy, planned, analysis.recording.origin)}",
             _why(analysis),
         ),
     )
 
 
-def _within(analysis: Analysis) -> str:
+def _within(analysis: Analysis, show: Callable[[float], str]) -> str:
     """The interval of what was predicted: the sum of the steps', as what is unsure is so in all
     alike.
     """
     _, low, high = _sums(analysis)
-    return f" (90 % interval {joules(low)} to {joules(high)})" if high > 0.0 else ""
+    return f" (90 % interval {span_of(low, high, show)})" if high > 0.0 else ""
 
 
 def _why(analysis: Analysis) -> str:
@@ -276,11 +278,10 @@ def _unshortened(program: ProgramTotals) -> Tile | None:
         return Tile(
             "cycle with full pauses", "not known", ("the pauses of the run don't match the cell's",)
         )
-    energy = f"{joules(full.energy)} in {seconds(full.seconds)}"
     return Tile(
         "cycle with full pauses",
         kilowatt_hours(full.energy),
-        (energy, cut, "computed from this run and the data"),
+        (f"in {seconds(full.seconds)}", cut, "computed from this run and the data"),
     )
 
 

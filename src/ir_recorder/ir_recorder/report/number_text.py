@@ -94,8 +94,9 @@ def percent(value: float) -> str:
 
 
 def share(part: float, whole: float) -> str:
-    """A part of a whole as a percentage."""
-    return percent(part / whole).lstrip("+") if whole > 0.0 else DASH
+    """A part of a whole as a percentage of three significant digits."""
+    known = whole > 0.0 and math.isfinite(part)
+    return f"{significant(100.0 * part / whole, 3)} %" if known else DASH
 
 
 def number(value: float, unit: str) -> str:

@@ -119,7 +119,12 @@ def tiles(found: BeforeAfter, costs: Costs) -> str:
             kilograms(costs.co2(year.value)),
             f"{kilowatt_hours(year.value)} {'less' if word == 'saved' else 'more'}",
         ),
-        ("cycle time", seconds(report.duration), f"today {seconds(today.duration)}", side.name),
+        (
+            "cycle time",
+            seconds(report.duration),
+            f"today {seconds(today.duration)}",
+            f"of the program \u201c{side.name}\u201d",
+        ),
         (
             "peak power",
             watts(report.peak_power),
@@ -390,7 +395,7 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
         "assumed": assumed_section(prices),
         "changes": change_table(found, prices),
         "hops": hop_table(found),
-        "front": front_chart([_point(side) for side in there]),
+        "front": front_chart([_point(side) for side in there], show=kilowatt_hours),
         "choices": "".join(_choice(side, found.towards) for side in there[1:]),
         "style": asset("page.css") + asset("before_after.css"),
         "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),

@@ -16,7 +16,7 @@ from ir_recorder.analysis.tending import Span
 from ir_recorder.report.files import write_output
 from ir_recorder.report.gantt import Bar, Gantt, legend, mode_bars
 from ir_recorder.report.headline import verdict
-from ir_recorder.report.number_text import DASH, joules, seconds, text, watts
+from ir_recorder.report.number_text import DASH, kilowatt_hours, seconds, text, watts
 from ir_recorder.report.page import PAGE_START, asset
 from ir_recorder.report.tables import check_table, table
 from ir_values.files import ANYWHERE, FileRoots
@@ -62,8 +62,8 @@ def _table(analyses: Mapping[str, Analysis]) -> str:
             f'<a href="{text(robot)}.html">{text(robot)}</a>',
             str(len(analysis.steps)),
             seconds(program_span(analysis).seconds),
-            f"<b>{joules(driven_joules(analysis))}</b>",
-            joules(predicted_joules(analysis)),
+            f"<b>{kilowatt_hours(driven_joules(analysis))}</b>",
+            kilowatt_hours(predicted_joules(analysis)),
             seconds(sum(waited(analysis).values())),
             watts(analysis.peak_power),
         )
@@ -75,8 +75,8 @@ def _table(analyses: Mapping[str, Analysis]) -> str:
             "<b>all together</b>",
             str(sum(len(analysis.steps) for analysis in every)),
             seconds(_whole(analyses).seconds),
-            f"<b>{joules(sum(map(driven_joules, every)))}</b>",
-            joules(sum(map(predicted_joules, every))),
+            f"<b>{kilowatt_hours(sum(map(driven_joules, every)))}</b>",
+            kilowatt_hours(sum(map(predicted_joules, every))),
             DASH,
             watts(common_peak(analyses)),
         )

@@ -1,4 +1,4 @@
-"""Where the joules go, as a Sankey diagram: from the mains to the axes' work and back.
+"""Where the energy goes, as a Sankey diagram: from the mains to the axes' work and back.
 
 Widths are joules: what enters a node leaves it. The same figures stand in a table below.
 """
@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.flows import EnergyFlows, energy_flows
-from ir_recorder.report.number_text import joules, share, text
+from ir_recorder.report.number_text import share, text, watt_hours
 from ir_recorder.report.tables import table
 
 WIDTH = 860.0
@@ -21,6 +21,7 @@ BAR = 14.0
 _TOP = 26.0
 _COLUMNS = (8.0, 240.0, 450.0, 690.0)
 _LEAST = 0.002  # share of the mains that is drawn; less is in the table alone
+_SMALL = 0.01  # the same, from which on a narrow bar says its share
 
 
 @dataclass
@@ -45,9 +46,9 @@ def sankey_section(analysis: Analysis) -> str:
         return ""
     over = "of the program" if analysis.steps else "of the recording"
     hint = (
-        f"Energy {over}, {joules(flows.mains)} at the mains. Gross flows: axes that brake return "
-        "energy to "
-        "the DC bus, masses that are lowered return it to the axes; both flow back to the left."
+        f"Energy {over}, {watt_hours(flows.mains)} at the mains. Gross flows: axes that brake "
+        "return energy to the DC bus, masses that are lowered return it to the axes; both flow "
+        "back to the left."
     )
     if flows.split:
         hint += (
@@ -55,7 +56,7 @@ def sankey_section(analysis: Analysis) -> str:
             "what remains."
         )
     return (
-        '<section id="flows"><h2>Where the joules go</h2>'
+        '<section id="flows"><h2>Where the energy goes</h2>'
         f'<p class="hint">{text(hint)}</p>'
         f'<div class="figure">{sankey(flows)}</div>'
         f"<details><summary>The same as a table</summary>{_table(flows)}</details></section>"
@@ -89,7 +90,7 @@ def _table(flows: EnergyFlows) -> str:
     cells = (
         (
             text(f"{source} to {to}"),
-            f"<b>{joules(value)}</b><small>{share(value, flows.mains)}</small>",
+            f"<b>{watt_hours(value)}</b><small>{share(value, flows.mains)}</small>",
         )
         for source, to, value in rows(flows)
     )
@@ -116,7 +117,9 @@ def sankey(flows: EnergyFlows) -> str:
             path, bottom = _back(nodes[source], nodes[to], value, scale, bottom)
             paths.append(path)
     bars = [_bar(node, scale, flows.mains) for node in shown]
-    label = f"Energy flows of {joules(flows.mains)} from the mains; the table below has the figures"
+    label = (
+        f"Energy flows of {watt_hours(flows.mains)} from the mains; the table below has the figures"
+    )
     return (
         f'<svg class="sankey" id="sankey" viewBox="0 0 {WIDTH:g} {bottom + 8.0:.0f}" role="img" '
         f'aria-label="{text(label)}">{"".join(paths)}{"".join(bars)}</svg>'
@@ -202,7 +205,7 @@ def _back(source: _Node, to: _Node, value: float, scale: float, bottom: float) -
         f"{_arc(r1, -1, -1)}V{y1 + r1:.1f}{_arc(r1, 1, -1)}"
     )
     middle = (x0 + x1) / 2.0
-    words = f"back {joules(value)}"
+    words = f"back {watt_hours(value)}"
     label = (
         f'<text x="{middle:.1f}" y="{under + 4.0:.1f}" text-anchor="middle">{text(words)}</text>'
     )
@@ -219,16 +222,16 @@ def _arc(radius: float, right: int, down: int) -> str:
 def _bar(node: _Node, scale: float, mains: float) -> str:
     x = _COLUMNS[node.column]
     high = max(node.joules * scale, 2.0)
-    words = (
-        f"{joules(node.joules)}, {share(node.joules, mains)}" if math.isfinite(node.joules) else ""
-    )
+    energy = watt_hours(node.joules)
+    words = f"{energy}, {share(node.joules, mains)}" if math.isfinite(node.joules) else ""
     rect = (
         f'<rect class="{node.style}" x="{x:g}" y="{node.y:.1f}" width="{BAR:g}" '
         f'height="{high:.1f}"/>'
     )
     at = x + BAR + 6.0
     if node.column < len(_COLUMNS) - 1 and high < 2.4 * GAP and node.column:
-        one = f"{text(node.name)} {text(words)}"
+        own = words if node.joules > _SMALL * mains else energy
+        one = f"{text(node.name)} {text(own)}"
         return f'{rect}<text x="{at:g}" y="{node.y + high / 2.0 + 4.0:.1f}">{one}</text>'
     y = node.y + min(high / 2.0, 60.0)
     return (
@@ -238,4 +241,4 @@ def _bar(node: _Node, scale: float, mains: float) -> str:
 
 
 def _title(source: str, to: str, value: float) -> str:
-    return f"<title>{text(source)} to {text(to)}: {text(joules(value))}</title>"
+    return f"<title>{text(source)} to {text(to)}: {text(watt_hours(value))}</title>"

@@ -107,11 +107,15 @@ def line_section(found: WholeLine | None, costs: Costs) -> str:
     origin = (
         "Shares as your file gives them."
         if own
-        else "Shares by Table I of the paper, of one production line: give your own in the file of "
-        "costs (line_robots, line_stand_by, line_technology, line_infrastructure)."
+        else "Shares by Table I of the paper, of one production line; your own: line_robots and "
+        "the three after it in the file of costs."
     )
-    sentence = f"{found.sentence[0].upper()}{found.sentence[1:]}"
-    hint = f"{sentence}. Other consumers are taken to stay as they are. {origin}"
+    word = "less" if found.line.gain()[0] == "saved" else "more"
+    hint = (
+        f"If every robot took {with_ends(found.robots)} {word}, the line would take "
+        f"{with_ends(found.line)} {word}, and the factory with its hall {with_ends(found.factory)} "
+        f"{word}. Other consumers are taken to stay as they are. {origin}"
+    )
     heads = ("consumer", ">today", ">as planned")
     return (
         f'<section id="whole-line"><h2>Of the whole line</h2><p class="hint">{text(hint)}</p>'

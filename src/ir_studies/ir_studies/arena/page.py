@@ -139,7 +139,9 @@ def page_html(runs: Sequence[Run], settings: ArenaSettings, missing: int = 0) ->
         "above": f"{_ABOVE:g}",
         "longest": seconds(longest(runs)),
         "cells": "".join(
-            _cell_section(runs, cell, titles, settings.planners) for cell in settings.cells
+            _cell_section(runs, cell, titles, settings.planners)
+            for cell in settings.cells
+            if of_cell(runs, cell)
         ),
         "bindings": text(_bindings(runs, settings.planners)),
         "settings": text(settings_text(settings)),
@@ -204,13 +206,15 @@ def verdict(runs: Sequence[Run], settings: ArenaSettings) -> str:
     if PORTFOLIO not in settings.planners or len(settings.planners) == 1:
         return ""
     said: list[str] = []
-    for cell, title in _titles(settings.cells).items():
+    titles = {cell: name for cell, name in _titles(settings.cells).items() if of_cell(runs, cell)}
+    for cell, title in titles.items():
         blocked, free = blocked_and_free(of_cell(runs, cell))
         said += _against(blocked, title, settings)
         said += _against(free, f"{title}, straight movement free", settings)
+    place = "In no cell" if len(titles) == len(settings.cells) else "In no cell that has runs"
     held = (
-        "In no cell did anybody solve more than the portfolio, or have a lower median J where "
-        "both solved."
+        f"{place} did anybody solve more than the portfolio, or have a lower median J where both "
+        "solved."
     )
     items = "".join(f"<li>{text(words)}</li>" for words in said or [held])
     return (
@@ -244,7 +248,7 @@ def _cell_section(
     title = titles[name]
     blocked, free = blocked_and_free(of_cell(runs, name))
     picture = cell_picture(cell, np.array(cell.tasks[0].start))
-    parts = [f"<h2>{text(title)}</h2>{picture}"]
+    parts = []
     for head, part in ((_BLOCKED, blocked), (_FREE, free)):
         if part:
             rows = [_row(figures(planner, part)) for planner in planners]
@@ -254,7 +258,8 @@ def _cell_section(
         [Point(planner, *means[planner], "measured") for planner in means], "duration"
     )
     if drawn:
-        parts.append(f'<h3>Time against energy</h3><p class="hint">{_FRONT_HINT}</p>{drawn}')
+        drawn = f'<div><h3>Time against energy</h3><p class="hint">{_FRONT_HINT}</p>{drawn}</div>'
+    parts.insert(0, f'<h2>{text(title)}</h2><div class="seen">{picture}{drawn}</div>')
     key = f"{list(titles).index(name) + 1}_{re.sub(r'[^a-z0-9]+', '_', title.lower())}"
     return f"<section>{''.join(parts)}</section>".replace(
         'id="energy_over_cycle_time"', f'id="energy_{key}"'

@@ -71,8 +71,9 @@ def legend(low: float, high: float) -> str:
     """What the colours mean."""
     steps = np.linspace(low, high, len(_COLOURS) + 1)
     keys = (
-        f'<span><span class="key" style="background:{one}"></span>{text(joules(float(at)))} '
-        "…</span>"
+        f'<span><svg class="cost key" viewBox="-7 -7 14 14">'
+        f'<circle r="{_radius(one):.1f}" style="fill:{one}"/></svg>'
+        f"{text(joules(float(at)))} …</span>"
         for one, at in zip(_COLOURS, steps, strict=False)
         if math.isfinite(low)
     )
@@ -129,7 +130,13 @@ def mark(x: float, y: float, kind: str, fill: str, words: str) -> str:
     if kind == "best":
         return f'<text class="star" x="{x:.1f}" y="{y + 6:.1f}">★{title}</text>'
     style = f'style="{"fill" if kind == "dot" else "stroke"}:{fill}"'
-    return f'<circle class="{kind}" cx="{x:.1f}" cy="{y:.1f}" r="3" {style}>{title}</circle>'
+    size = f'r="{_radius(fill):.1f}"'
+    return f'<circle class="{kind}" cx="{x:.1f}" cy="{y:.1f}" {size} {style}>{title}</circle>'
+
+
+def _radius(fill: str) -> float:
+    """Of a mark: what costs more is larger, so that its colour is not all that says it."""
+    return 2.5 + (0.9 * _COLOURS.index(fill) if fill in _COLOURS else 0.0)
 
 
 def outlines(cell: Cell) -> Iterator[FloatArray]:
@@ -184,7 +191,9 @@ def page_html(
     known: Sequence[Known], finals: Sequence[Sequence[Final]], settings: LayoutSettings, cell: Cell
 ) -> str:
     """The page as text. cell: as given."""
-    said = "".join(f"<li>{text(one)}</li>" for one in sentences(known, finals, settings))
+    said = "".join(
+        f"<li>{text(_named(one, finals))}</li>" for one in sentences(known, finals, settings)
+    )
     parts = {
         "title": f"Layout of {text(cell.name)}",
         "subtitle": text(
@@ -202,15 +211,36 @@ def page_html(
     return page("layout", parts)
 
 
+def _named(sentence: str, finals: Sequence[Sequence[Final]]) -> str:
+    """A sentence about the best with its file instead of its values, which the table below has."""
+    _, best = ends(finals)
+    return sentence.replace(best[0].placement.key, "best_1.yaml") if best else sentence
+
+
+def _moved(one: Final, rank: int) -> str:
+    """The cell file of a placement, and below it what stands how far from where it is given."""
+    if one.is_given:
+        return "<b>as given</b>"
+    by: dict[str, list[str]] = {}
+    for name, value in sorted(one.placement.values.items()):
+        owner, _, part = name.removeprefix(_MACHINE).rpartition(".")
+        unit = "°" if part.endswith("_deg") else " m"
+        shown = f"{part.removesuffix('_deg')} {value:+g}{unit}"
+        if value:
+            by.setdefault(owner, []).append(shown)
+    lines = (f"<small>{text(owner)}: {text(', '.join(own))}</small>" for owner, own in by.items())
+    return f"<b>best_{rank}.yaml</b>{''.join(lines)}"
+
+
 def _rows(finals: Sequence[Sequence[Final]]) -> Iterator[tuple[str, ...]]:
     given, _ = ends(finals)
     rank = 0
     for own in finals:
         rank += not own[0].is_given
         for one in own:
-            name = "as given" if one.is_given else f"best_{rank}.yaml: {one.placement.key}"
+            name = _moved(one, rank)
             if not one.solved:
-                yield text(name), text(one.condition.text), *[DASH] * (len(_HEADS) - 2)
+                yield name, text(one.condition.text), *[DASH] * (len(_HEADS) - 2)
                 continue
             less = DASH
             if given is not None and not one.is_given:
@@ -219,7 +249,7 @@ def _rows(finals: Sequence[Sequence[Final]]) -> Iterator[tuple[str, ...]]:
                 share = percent(saved / like.mean()).lstrip("+")
                 less = _with_interval(f"{joules(saved)} ({share})", between)
             yield (
-                text(name), text(one.condition.text), _with_interval(joules(one.mean()), one.interval),  # noqa: E501
+                name, text(one.condition.text), _with_interval(joules(one.mean()), one.interval),
                 joules(one.spread()), less, joules(one.mean("moving_j")),
                 f"{one.mean('duration_s'):.2f} s", millimetres(one.mean("clearance_m")),
             )  # fmt: skip

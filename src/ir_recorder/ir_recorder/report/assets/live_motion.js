@@ -35,13 +35,15 @@ class LiveMotion extends Motion {
     if (this.history && this.history.records.length) super.draw();
   }
   drawTrail(k) {
-    const records = this.history.records, points = [], tints = [], now = records[k].t;
+    const records = this.history.records, points = [], tints = [], widths = [], now = records[k].t;
     for (let i = k; i >= 0 && now - records[i].t < TRAIL_SECONDS; i--) {
       if (!records[i].q) break;
       points.push(...this.tool(records[i]));
-      tints.push(...this.powerTint(records[i].w ? records[i].w[1] : 0));
+      const watts = records[i].w ? records[i].w[1] : 0;
+      tints.push(...this.powerTint(watts));
+      widths.push(this.powerWidth(watts));
     }
-    this.line(points, tints, { wide: 4 });
+    this.line(points, tints, { wide: 3.5 }, true, widths);
   }
   drawPlan() {
     const path = (this.record(this.frame(this.timeline.now)) || {}).path;
@@ -58,9 +60,9 @@ class LiveMotion extends Motion {
     const tint = record.near[0] < this.bound ? this.tints.bad : this.tints.a3;
     this.line(record.near.slice(1, 7), [...tint, ...tint], { wide: 3, onTop: true }, false);
   }
-  line(points, tints, how, strip = true) {
+  line(points, tints, how, strip = true, widths = null) {
     if (points.length < 6) return;
-    const path = this.renderer.path(new Float32Array(points), new Float32Array(tints), strip);
+    const path = this.renderer.path(new Float32Array(points), new Float32Array(tints), strip, widths);
     this.renderer.drawPath(path, how);
     this.renderer.release(path);
   }

@@ -51,6 +51,7 @@ class Motion {
     this.ramp = RAMP.map(colour);
     this.pathTints = new Float32Array(this.path.length);
     for (let i = 0; i < this.frames; i++) this.pathTints.set(this.powerTint(this.power[i]), 3 * i);
+    this.pathWidths = Float32Array.from({ length: this.frames }, (_, i) => this.powerWidth(this.power[i]));
     for (const name of ["trail", "grid"]) if (this[name]) { this.renderer.release(this[name]); this[name] = null; }
     this.schedule();
   }
@@ -58,6 +59,8 @@ class Motion {
     const x = Math.min(Math.max(watts / this.mostPower, 0), 1) * (this.ramp.length - 1), k = Math.min(Math.floor(x), this.ramp.length - 2);
     return this.ramp[k].map((v, i) => v + (this.ramp[k + 1][i] - v) * (x - k));
   }
+  /* Where much power is taken the path is wide too: its colour is not all that says it. */
+  powerWidth(watts) { return 0.6 + 2.2 * Math.min(Math.max(watts / this.mostPower, 0), 1); }
   /* The watts of the hottest colour: the peak that the page names. */
   scale(watts) {
     this.mostPower = watts;
@@ -253,9 +256,9 @@ class Motion {
     this.renderer.drawPath(this.grid, { wide: 1, alpha: 0.6 });
   }
   drawTrail(frame) {
-    if (!this.trail) this.trail = this.renderer.path(this.path, this.pathTints, true);
-    this.renderer.drawPath(this.trail, { wide: 1.5, alpha: 0.3 });
-    this.renderer.drawPath(this.trail, { wide: 4, count: Math.floor(frame) });
+    if (!this.trail) this.trail = this.renderer.path(this.path, this.pathTints, true, this.pathWidths);
+    this.renderer.drawPath(this.trail, { wide: 2.5, alpha: 0.55 });
+    this.renderer.drawPath(this.trail, { wide: 3.5, count: Math.floor(frame) });
   }
   pairAt(time) {
     for (const c of this.nearest) {

@@ -59,15 +59,15 @@ void main() { c = tint; vec4 a = view * vec4(point, 1.0); vec4 b = view * vec4(o
   gl_Position = a + vec4(across * side * wide * pixel * a.w, 0.0, 0.0); }`;
 const LINE_FRAGMENT = `precision mediump float; varying vec3 c; uniform float alpha; void main() { gl_FragColor = vec4(c, alpha); }`;
 
-/* Corners of the quads of all segments: point, other end, tint and side of each, 10 numbers a corner. */
-function lineQuads(points, tints, strip) {
+/* Corners of the quads of all segments: point, other end, tint, and side times width of each, 10 numbers a corner. */
+function lineQuads(points, tints, strip, widths) {
   const count = strip ? points.length / 3 - 1 : points.length / 6, out = new Float32Array(Math.max(count, 0) * 60);
   for (let s = 0; s < count; s++) {
     const i = strip ? s : 2 * s;
     [[i, i + 1, 1], [i, i + 1, -1], [i + 1, i, -1], [i + 1, i, -1], [i + 1, i, 1], [i, i + 1, -1]].forEach(([a, b, side], k) => {
       const at = s * 60 + k * 10;
       for (let d = 0; d < 3; d++) { out[at + d] = points[3 * a + d]; out[at + 3 + d] = points[3 * b + d]; out[at + 6 + d] = tints[3 * a + d]; }
-      out[at + 9] = side;
+      out[at + 9] = widths ? side * widths[a] : side;
     });
   }
   return out;
@@ -152,9 +152,9 @@ class GlRenderer {
     for (const [mesh, model] of items) this.drawMesh(mesh, M4.times(SHADOW, model), tint, alpha, 1);
     gl.disable(gl.STENCIL_TEST);
   }
-  /* Lines to draw again and again. points and tints: 3 numbers a corner; strip: one path, else pairs. */
-  path(points, tints, strip) {
-    return { buffer: this.fill(this.gl.createBuffer(), lineQuads(points, tints, strip)), count: strip ? points.length / 3 - 1 : points.length / 6 };
+  /* Lines to draw again and again. points and tints: 3 numbers a corner; strip: one path, else pairs; widths: a factor a corner. */
+  path(points, tints, strip, widths) {
+    return { buffer: this.fill(this.gl.createBuffer(), lineQuads(points, tints, strip, widths)), count: strip ? points.length / 3 - 1 : points.length / 6 };
   }
   /* The first `count` segments of a path, `wide` pixels wide. */
   drawPath(path, { count = path.count, wide = 2, alpha = 1, onTop = false } = {}) {
@@ -221,16 +221,17 @@ class PlainRenderer {
     }
   }
   drawShadows() {}
-  path(points, tints, strip) { return { points, tints, strip, count: strip ? points.length / 3 - 1 : points.length / 6 }; }
-  drawPath(path, { count = path.count, alpha = 1, onTop = false } = {}) {
-    const { points, tints, strip } = path;
+  path(points, tints, strip, widths) { return { points, tints, strip, widths, count: strip ? points.length / 3 - 1 : points.length / 6 }; }
+  drawPath(path, { count = path.count, wide = 2, alpha = 1, onTop = false } = {}) {
+    const { points, tints, strip, widths } = path;
     for (let k = 0; k < count; k++) {
       const i = strip ? k : 2 * k;
       const a = this.screen(points.subarray(3 * i, 3 * i + 3)), b = this.screen(points.subarray(3 * i + 3, 3 * i + 6));
       if (!a || !b) continue;
       const depth = onTop ? 0 : (a[2] + b[2]) / 2, fill = rgb([...tints.subarray(3 * i, 3 * i + 3)]);
       const onFloor = points[3 * i + 2] === 0 && points[3 * i + 5] === 0;
-      (onFloor ? this.under : this.faces).push({ corners: [a, b], depth, fill, alpha });
+      const width = wide * (widths ? widths[i] : 1) * (window.devicePixelRatio || 1);
+      (onFloor ? this.under : this.faces).push({ corners: [a, b], depth, fill, alpha, width });
     }
   }
   release() {}
@@ -238,8 +239,9 @@ class PlainRenderer {
   end() {
     const g = this.g;
     for (const list of [this.under, this.faces.sort((a, b) => b.depth - a.depth)]) {
-      for (const { corners, fill, alpha } of list) {
+      for (const { corners, fill, alpha, width } of list) {
         g.globalAlpha = alpha;
+        g.lineWidth = width || 1;
         g.beginPath();
         corners.forEach(([x, y], k) => (k ? g.lineTo(x, y) : g.moveTo(x, y)));
         g.strokeStyle = g.fillStyle = fill;
