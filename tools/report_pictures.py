@@ -1,5 +1,5 @@
-"""Draw the pictures of docs/report.md: a report at a desk, on a tablet, a phone and paper; the live
-view.
+"""Draw the pictures of docs/report.md and README.md: a report at a desk, on a tablet, a phone and
+paper; the live view; today's program beside the planner's.
 
     make demo && python tools/report_pictures.py [--recording out/demo.mcap] [--folder docs/images]
 
@@ -17,8 +17,11 @@ from pathlib import Path
 from _chromium import Browser
 from _live_picture import live_view
 
+from ir_planner import Planner
+from ir_planner.before_after import before_after_common
 from ir_recorder import Analysis, analyse, findings, read_recording
 from ir_recorder.report import write_report
+from ir_recorder.report.program_comparison import write_before_after
 
 PAPER = (740, 1094)  # px at 96 dpi: A4 less the margins of the page's style
 
@@ -45,6 +48,7 @@ SHOTS = (
     Shot("report_methods.png", (1400, 640), at="#methods"),
     Shot("report_print.png", PAPER, media="print"),
 )
+COMPARED = Shot("compare.png", (1100, 880))
 LIVE_SHOTS = (
     Shot("live.png", (1400, 1500)),
     Shot("live_phone.png", (390, 1500), dark=True, touch=True),
@@ -68,10 +72,15 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder, Browser() as browser:
         file = write_report(analysis, findings(analysis), Path(folder) / "report.html")
         faults = [fault for shot in SHOTS for fault in _draw(browser, file, shot, asked.folder)]
+        planner = Planner("demo", clock=lambda: 0.0)
+        found = before_after_common(planner, (), planner.cell.park)
+        file = write_before_after(found, planner.cell, Path(folder) / "compare.html")
+        faults += _draw(browser, file, COMPARED, asked.folder)
         with live_view(analysis, _instant(analysis)) as server:
             for shot in LIVE_SHOTS:
                 faults += _draw(browser, server.address, shot, asked.folder)
-    sys.stdout.write("".join(f"{asked.folder / shot.name}\n" for shot in (*SHOTS, *LIVE_SHOTS)))
+    drawn = (*SHOTS, COMPARED, *LIVE_SHOTS)
+    sys.stdout.write("".join(f"{asked.folder / shot.name}\n" for shot in drawn))
     sys.stderr.write("".join(f"{fault}\n" for fault in faults))
     return 1 if faults else 0
 

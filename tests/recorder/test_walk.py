@@ -1,5 +1,9 @@
 """Law: figures of one name are rounded from one value, wherever they stand: every tile and table
-of report, comparison and fleet, their CSV and workbooks, and the sentences of a plan.
+of report, comparison, fleet and several robots, their CSV and workbooks, and the terminal.
+
+The same of today's program beside the planner's stands in tests/before_after/test_page.py, of a
+plan and its report in test_same_saving.py there, of the whole line in test_whole_line.py; README's
+figures are compared with what their command writes in tests/packaging.
 """
 
 from __future__ import annotations
@@ -16,6 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ir_cli.ros.demo import Outcome
 from ir_msgs.msg import PlannedMovement
 from ir_msgs_py.modes import Mode
 from ir_recorder import Analysis, analyse, findings, read_recording
@@ -24,7 +29,9 @@ from ir_recorder.report import report_html
 from ir_recorder.report.compare import comparison_html
 from ir_recorder.report.costs import Costs
 from ir_recorder.report.fleet import fleet_columns, fleet_html, member_of
+from ir_recorder.report.robots import common_peak, driven_joules, predicted_joules, robots_html
 from ir_recorder.report.step_table import write_table
+from ir_recorder.report.tables import savings_lines
 
 
 def _reader() -> ModuleType:
@@ -208,3 +215,43 @@ def test_robots_and_months_of_a_fleet_are_sums_of_their_recordings(walked: Analy
         if what == "cycle"
     ]
     assert whole == [cycle.energy] * 6
+
+
+def test_several_robots_are_sums_of_each(walked: Analysis) -> None:
+    both = {"left": walked, "right": walked}
+    found = READ.figures_of(robots_html(both, findings(walked)))
+    exact = {
+        "left: energy": driven_joules(walked),
+        "left: predicted": predicted_joules(walked),
+        "left: peak": walked.peak_power,
+        "all together: energy": 2.0 * driven_joules(walked),
+        "all together: predicted": 2.0 * predicted_joules(walked),
+        "all together: peak": common_peak(both),
+    }
+    for name, value in exact.items():
+        (figure,) = READ.called(found, name)
+        assert figure.shows(value), (figure, value)
+
+
+def test_the_terminal_says_what_the_pages_show(walked: Analysis) -> None:
+    cycle = production_of(walked)
+    program = walked.program
+    assert cycle is not None
+    assert program is not None
+    totals = {"this run": program.whole, "with full pauses": cycle}
+    said = Outcome(walked, findings(walked)).text().splitlines()
+    seen = set()
+    for line in said:
+        start = next((name for name in totals if line.startswith(name)), "")
+        for figure in READ.figures_in(line.partition(";")[0], start) if start else ():
+            exact = {"J": totals[start].energy, "s": totals[start].seconds}[figure.kind]
+            assert figure.shows(exact), (line, exact)
+            seen.add(start)
+    assert "this run" in seen
+    assert walked.savings is not None
+    total = next(line for line in savings_lines(walked) if line.startswith("total:"))
+    joules = [figure for figure in READ.figures_in(total, "total") if figure.kind == "J"][:2]
+    for figure, exact in zip(
+        joules, (walked.savings.total.planned, walked.savings.total.common), strict=True
+    ):
+        assert figure.shows(exact), total

@@ -71,7 +71,7 @@ def legend(low: float, high: float) -> str:
     """What the colours mean."""
     steps = np.linspace(low, high, len(_COLOURS) + 1)
     keys = (
-        f'<span><svg class="cost key" viewBox="-7 -7 14 14">'
+        f'<span><svg class="cost key" viewBox="-7.5 -7.5 15 15">'
         f'<circle r="{_radius(one):.1f}" style="fill:{one}"/></svg>'
         f"{text(joules(float(at)))} …</span>"
         for one, at in zip(_COLOURS, steps, strict=False)
@@ -136,7 +136,7 @@ def mark(x: float, y: float, kind: str, fill: str, words: str) -> str:
 
 def _radius(fill: str) -> float:
     """Of a mark: what costs more is larger, so that its colour is not all that says it."""
-    return 2.5 + (0.9 * _COLOURS.index(fill) if fill in _COLOURS else 0.0)
+    return 3.4 + (0.9 * _COLOURS.index(fill) if fill in _COLOURS else 0.0)
 
 
 def outlines(cell: Cell) -> Iterator[FloatArray]:
@@ -192,7 +192,7 @@ def page_html(
 ) -> str:
     """The page as text. cell: as given."""
     said = "".join(
-        f"<li>{text(_named(one, finals))}</li>" for one in sentences(known, finals, settings)
+        f"<li>{text(_briefly(one, finals))}</li>" for one in sentences(known, finals, settings)
     )
     parts = {
         "title": f"Layout of {text(cell.name)}",
@@ -211,7 +211,7 @@ def page_html(
     return page("layout", parts)
 
 
-def _named(sentence: str, finals: Sequence[Sequence[Final]]) -> str:
+def _briefly(sentence: str, finals: Sequence[Sequence[Final]]) -> str:
     """A sentence about the best with its file instead of its values, which the table below has."""
     _, best = ends(finals)
     return sentence.replace(best[0].placement.key, "best_1.yaml") if best else sentence
