@@ -13,7 +13,7 @@ from typing import Any, cast
 import pytest
 
 from ir_cli.errors import DemonstrationError
-from ir_cli.ros.power_tour import PowerWatch
+from ir_cli.ros.power_tour import PowerWatch, stand_on_motors
 from ir_msgs.msg import PowerMode, PowerState
 from ir_msgs_py.ros.client import Client
 
@@ -105,3 +105,29 @@ def test_a_mode_that_the_controller_leaves_by_itself_has_not_stayed(
 def test_a_silent_meter_is_said_to_say_nothing() -> None:
     with pytest.raises(DemonstrationError, match="the mains meter says nothing"):
         watch(FakeMeter(behind=0.0, step=0.1)).stays(PowerMode.STAND_ON_BRAKES, 0.1)
+
+
+class ClosingMeter(FakeMeter):
+    """Of a controller whose timer closes the brakes a few readings after they were released."""
+
+    _left = 0
+
+    def ask(self, *_: object) -> SimpleNamespace:
+        self.mode = PowerMode.STAND_ON_MOTORS
+        self._left = 5
+        return SimpleNamespace(inputs=None)
+
+    def read(self) -> None:
+        self._left -= 1
+        if self._left < 0:
+            self.mode = PowerMode.STAND_ON_BRAKES
+        super().read()
+
+
+def test_a_plant_that_lags_further_than_the_brakes_stay_open_ends_the_tour(
+    watched: Callable[[FakeMeter], PowerWatch],
+) -> None:
+    """Once the tour went on for ever."""
+    meter = ClosingMeter(behind=500.0, step=0.01)
+    with pytest.raises(DemonstrationError, match="lags 500 s behind the clock"):
+        stand_on_motors(cast(Client, cast(Any, meter)), watched(meter), 0.1)

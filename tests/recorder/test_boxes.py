@@ -24,6 +24,7 @@ from ir_recorder.report import report_html
 from ir_recorder.report.compare import comparison_html
 from ir_recorder.report.fleet import fleet_html, member_of
 from ir_recorder.report.program_comparison import before_after_html
+from ir_recorder.report.robots import robots_html
 from ir_studies.arena.figures import Run
 from ir_studies.arena.page import page_html as arena_html
 from ir_studies.arena.settings import ArenaSettings, Entry
@@ -85,6 +86,10 @@ def fleet(analysis: Analysis) -> str:
     assert member is not None
     robots = [replace(member, robot=f"hall_{k}_robot_with_a_long_name") for k in range(9)]
     return fleet_html(robots, left_out=["cut.mcap: left out: it was not driven to the end"])
+
+
+def robots(analysis: Analysis) -> str:
+    return robots_html({"left": analysis, "right": analysis}, findings(analysis))
 
 
 def before_and_after(_: Analysis) -> str:
@@ -160,6 +165,7 @@ PAGES: dict[str, Callable[[Analysis], str]] = {
     "long names": long_names,
     "recordings": recordings,
     "fleet": fleet,
+    "robots": robots,
     "before and after": before_and_after,
     "arena": arena,
     "statistics": statistics,
