@@ -72,6 +72,15 @@ class View:
         )
         return f'<g class="{style}">{marks}</g>' if len(points) else ""
 
+    def crosses(self, points: FloatArray, style: str, radius: float) -> str:
+        """Points (N, 3), each a cross."""
+        arm = f"l{2.0 * radius:g} {2.0 * radius:g}m0 {-2.0 * radius:g}l{-2.0 * radius:g} "
+        marks = "".join(
+            f'<path d="M{x - radius:.1f} {y - radius:.1f}{arm}{2.0 * radius:g}"/>'
+            for x, y in self.flat(points)
+        )
+        return f'<g class="{style}">{marks}</g>' if len(points) else ""
+
     def segments(self, first: FloatArray, second: FloatArray, style: str) -> str:
         """Lines between pairs of points (N, 3)."""
         ends = zip(self.flat(first), self.flat(second), strict=True)

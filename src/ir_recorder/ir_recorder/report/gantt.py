@@ -47,14 +47,24 @@ def mode_bars(power: PowerSeries, span: Span) -> list[Bar]:
     ]
 
 
+_MODES = ("MOVING", "STAND_ON_MOTORS", "STAND_ON_BRAKES", "BUS_POWER_OFF", "HIBERNATION")
+
+
 def legend(kinds: Mapping[str, str]) -> str:
-    """What the styles of bars mean."""
+    """What the styles of bars and the colours of the power modes mean."""
     words = "".join(
         f'<span><svg class="gantt key" viewBox="0 0 10 10"><rect class="{kind}" width="10" '
         f'height="10"/></svg> {text(name)}</span> '
         for kind, name in kinds.items()
     )
-    return f'<p class="key-row">{words}<span>power: mean of each {_BINS}th of the time</span></p>'
+    modes = "".join(
+        f'<span><i class="key m-{mode}"></i>{mode_words(mode)}</span> ' for mode in _MODES
+    )
+    between = '<span><i class="key"></i>between two modes</span>'
+    return (
+        f'<p class="key-row">{words}<span>power: mean of each {_BINS}th of the time</span></p>'
+        f'<p class="key-row"><b>mode:</b> {modes}{between}</p>'
+    )
 
 
 class Gantt:

@@ -66,8 +66,11 @@ def configuration_figure(log: ConfigurationLog, cell: Cell, number: int) -> str:
     ordered = sorted(log.tracks, key=lambda track: track.outcome == "")
     lines = (
         view.line(track.points, "tried" if track.outcome else "accepted")
-        + view.dots(track.points[:1], "dropped" if track.outcome else "kept", 2.6)
-        + (view.dots(track.points[-1:], "dropped", 1.6) if track.outcome else "")
+        + (
+            view.crosses(track.points[:: max(len(track.points) - 1, 1)], "dropped", 2.6)
+            if track.outcome
+            else view.dots(track.points[:1], "kept", 2.6)
+        )
         for track in ordered
     )
     content = (
@@ -247,7 +250,7 @@ def withdrawal_figure(log: WithdrawalLog, cell: Cell, number: int) -> str:
         view.held(cell, log.load, station.pose),
         view.machines(cell, log.station, log.path[0], _DEPTH),
         view.segments(parent, child, "tried"),
-        view.dots(log.dropped, "dropped", 1.6),
+        view.crosses(log.dropped, "dropped", 1.8),
         view.dots(child, "kept", 2.2),
         view.line(log.path, "path"),
         view.dots(log.path[:1], "place", 4.5),
@@ -276,11 +279,9 @@ def _sideways(log: WithdrawalLog, radial: FloatArray) -> FloatArray:
 _MOST = 24  # figures
 _KEY = (
     '<p class="hint">Black: the path that was found. Blue: what is driven, optimised from there. '
-    "Dashed: the straight movement. Green: kept or accepted. Red: dropped, rejected or "
-    "colliding. Grey: "
-    "bodies of the machines, those that are not near the drawn plane as outlines. Paths are "
-    "those of the "
-    "tool centre point.</p>"
+    "Dashed: the straight movement. Green dots: kept or accepted. Red crosses: dropped or "
+    "rejected; a thick red line collides. Grey: bodies of the machines, those that are not near "
+    "the drawn plane as outlines. Paths are those of the tool centre point.</p>"
 )
 
 

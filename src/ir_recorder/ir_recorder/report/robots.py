@@ -15,8 +15,8 @@ from ir_recorder.analysis.robots import zone_passes
 from ir_recorder.analysis.tending import Span
 from ir_recorder.report.files import write_output
 from ir_recorder.report.gantt import Bar, Gantt, legend, mode_bars
-from ir_recorder.report.headline import verdict
-from ir_recorder.report.number_text import DASH, kilowatt_hours, seconds, text, watts
+from ir_recorder.report.headline import Tile, failing, verdict
+from ir_recorder.report.number_text import DASH, seconds, text, watt_hours, watts
 from ir_recorder.report.page import PAGE_START, asset
 from ir_recorder.report.tables import check_table, table
 from ir_values.files import ANYWHERE, FileRoots
@@ -48,11 +48,29 @@ def robots_html(analyses: Mapping[str, Analysis], checks: Sequence[Finding]) -> 
         f'<!doctype html><html lang="en"><head>{head}<title>{text(title)}</title>'
         f"<style>{asset('page.css')}</style></head><body><header><div><h1>{text(title)}</h1>"
         f'<p class="subtitle">{text(what)}</p></div>{verdict(checks)}</header><main>'
+        f'<section class="tiles">{_tiles(analyses)}</section>{failing(checks)}'
         f"<section><h2>Energy and time of the programs</h2>{_table(analyses)}</section>"
-        f"<section><h2>Who moved, waited and passed a zone when</h2>{_figure(analyses)}</section>"
-        f'<section id="checks"><h2>Checks</h2>{check_table(checks)}</section></main>'
+        f"<section><h2>Who moved, waited and passed a zone when</h2>"
+        f"{_figure(analyses)}</section>"
+        f'<details class="part" id="checks"><summary><h2>Checks</h2></summary>{check_table(checks)}'
+        "</details></main>"
         f"<script>{asset('export.js')}\nexportButtons();</script></body></html>"
     )
+
+
+def _tiles(analyses: Mapping[str, Analysis]) -> str:
+    """What all robots took together, when, and how long they waited for each other."""
+    every = analyses.values()
+    energy = watt_hours(sum(map(driven_joules, every)))
+    predicted = f"predicted {watt_hours(sum(map(predicted_joules, every)))}"
+    waits = [f"{name} {seconds(sum(waited(a).values()))}" for name, a in analyses.items()]
+    shown = (
+        Tile("energy of all", energy, (predicted,)),
+        Tile("time", seconds(_whole(analyses).seconds), ("from the first step to the last",)),
+        Tile("common peak", watts(common_peak(analyses)), ("of a 10 ms reading",)),
+        Tile("waited for signals", waits[0], tuple(waits[1:])),
+    )
+    return "".join(tile.html() for tile in shown)
 
 
 def _table(analyses: Mapping[str, Analysis]) -> str:
@@ -62,8 +80,8 @@ def _table(analyses: Mapping[str, Analysis]) -> str:
             f'<a href="{text(robot)}.html">{text(robot)}</a>',
             str(len(analysis.steps)),
             seconds(program_span(analysis).seconds),
-            f"<b>{kilowatt_hours(driven_joules(analysis))}</b>",
-            kilowatt_hours(predicted_joules(analysis)),
+            f"<b>{watt_hours(driven_joules(analysis))}</b>",
+            watt_hours(predicted_joules(analysis)),
             seconds(sum(waited(analysis).values())),
             watts(analysis.peak_power),
         )
@@ -75,8 +93,8 @@ def _table(analyses: Mapping[str, Analysis]) -> str:
             "<b>all together</b>",
             str(sum(len(analysis.steps) for analysis in every)),
             seconds(_whole(analyses).seconds),
-            f"<b>{kilowatt_hours(sum(map(driven_joules, every)))}</b>",
-            kilowatt_hours(sum(map(predicted_joules, every))),
+            f"<b>{watt_hours(sum(map(driven_joules, every)))}</b>",
+            watt_hours(sum(map(predicted_joules, every))),
             DASH,
             watts(common_peak(analyses)),
         )

@@ -10,7 +10,7 @@ from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.tending import PartRow, Span, Tending
 from ir_recorder.reading.recording import PowerSeries
 from ir_recorder.report.gantt import Bar, Gantt, legend, mode_bars
-from ir_recorder.report.number_text import DASH, kilowatt_hours, seconds, text
+from ir_recorder.report.number_text import DASH, seconds, text, watt_hours
 from ir_recorder.report.tables import table
 
 
@@ -40,8 +40,8 @@ def _parts(tending: Tending) -> str:
                 name,
                 seconds(part.span.seconds),
                 seconds(part.planned_seconds),
-                f"<b>{kilowatt_hours(part.joules)}</b>",
-                kilowatt_hours(part.planned_joules),
+                f"<b>{watt_hours(part.joules)}</b>",
+                watt_hours(part.planned_joules),
                 _waits({**part.paused, **late}),
                 _waits(part.finished),
             )
@@ -72,7 +72,7 @@ def _figure(part: PartRow, tending: Tending, power: PowerSeries | None) -> str:
         chart.lane(machine.name, bars)
     if power is not None and len(power.time) > 1:
         chart.power([power])
-    said = f"part {part.number}: {seconds(part.span.seconds)}, {kilowatt_hours(part.joules)}"
+    said = f"part {part.number}: {seconds(part.span.seconds)}, {watt_hours(part.joules)}"
     return (
         f'<figure class="figure"><figcaption>{text(said)}</figcaption>'
         f"{chart.drawn(f'part_{part.number}', said)}</figure>"
