@@ -37,12 +37,12 @@ def main() -> int:
     with Browser() as browser:
         for page in asked.pages:
             name = asked.name or Path(page).stem
-            faults += draw(browser, page, asked.folder / name, asked.unfold)
+            faults += draw(browser, page, asked.folder / name, unfold=asked.unfold)
     sys.stderr.write("".join(f"{fault}\n" for fault in faults))
     return 1 if faults else 0
 
 
-def draw(browser: Browser, address: str, base: Path, unfold: bool) -> list[str]:
+def draw(browser: Browser, address: str, base: Path, *, unfold: bool) -> list[str]:
     """Writes the pictures of one page; returns what was wrong with it."""
     faults = []
     served = address.startswith("http")

@@ -6,10 +6,12 @@ Needs Chromium. Without it these tests say `not checked: browser`; where CI=true
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import axe_core_python
@@ -36,6 +38,8 @@ from ir_studies.statistics.findings import findings_of
 from ir_studies.statistics.outputs import page_html as statistics_html
 from ir_studies.statistics.settings import StatisticsSettings
 
+ROOT = Path(__file__).resolve().parents[2]
+PICTURES = ROOT / "out" / "pages"
 BOXES = Path(__file__).with_name("page_boxes.js").read_text()
 AXE = (Path(axe_core_python.__file__).parent / "axe.min.js").read_text(encoding="utf-8")
 FOUND = """axe.run(document, {resultTypes: ['violations']}).then(
@@ -43,6 +47,7 @@ FOUND = """axe.run(document, {resultTypes: ['violations']}).then(
         `${one.id}: ${one.nodes.slice(0, 3).map((node) => node.html.slice(0, 120)).join(' | ')}`))
 """
 SIZES = {"desk": (1400, 900), "phone": (390, 844), "paper": (703, 1047)}
+ENDINGS = ("_desk.png", "_phone.png", ".pdf")
 OPEN = "document.querySelectorAll('details').forEach((each) => { each.open = true; })"
 
 
@@ -195,6 +200,32 @@ def test_nothing_is_cut_overlaps_or_scrolls_and_axe_finds_nothing(
             faults[f"{size}, axe"] = page.run(FOUND)
         page.close()
     assert {size: found for size, found in faults.items() if found} == {}
+
+
+def page_pictures() -> ModuleType:
+    """The tool that draws pages; the fixture of the browser has loaded the module that it needs."""
+    path = ROOT / "tools" / "page_pictures.py"
+    spec = importlib.util.spec_from_file_location("page_pictures", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.long
+def test_pictures_of_every_page_are_left_to_look_at(
+    browser: Any, analysis: Analysis, tmp_path: Path
+) -> None:
+    """At a desk, on a phone and as PDF in out/pages: no judge of boxes sees what people see."""
+    tool = page_pictures()
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    for name, made in PAGES.items():
+        path = tmp_path / "page.html"
+        path.write_text(made(analysis), encoding="utf-8")
+        base = PICTURES / name.replace(" ", "_")
+        assert tool.draw(browser, str(path), base, unfold=False) == []
+        assert all((PICTURES / f"{base.name}{end}").stat().st_size > 10_000 for end in ENDINGS)
 
 
 def test_the_judge_sees_faults(browser: Any, tmp_path: Path) -> None:
