@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ir_cli.ros.demo import Outcome
+from ir_cli.ros.demo import DemoOutcome
 from ir_msgs.msg import PlannedMovement
 from ir_msgs_py.modes import Mode
 from ir_recorder import Analysis, analyse, findings, read_recording
@@ -238,13 +238,16 @@ def test_the_terminal_says_what_the_pages_show(walked: Analysis) -> None:
     program = walked.program
     assert cycle is not None
     assert program is not None
-    totals = {"this run": program.whole, "with full pauses": cycle}
-    said = Outcome(walked, findings(walked)).text().splitlines()
+    totals = {
+        "this run": {"J": program.whole.energy, "s": program.whole.seconds},
+        "with full pauses": {"J": cycle.energy, "s": cycle.seconds},
+    }
+    said = DemoOutcome(walked, findings(walked)).text().splitlines()
     seen = set()
     for line in said:
         start = next((name for name in totals if line.startswith(name)), "")
         for figure in READ.figures_in(line.partition(";")[0], start) if start else ():
-            exact = {"J": totals[start].energy, "s": totals[start].seconds}[figure.kind]
+            exact = totals[start][figure.kind]
             assert figure.shows(exact), (line, exact)
             seen.add(start)
     assert "this run" in seen

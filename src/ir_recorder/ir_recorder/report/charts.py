@@ -179,8 +179,9 @@ _LEAST_S = 0.05
 _LEAST_J = 5.0
 # unit of an axis by its largest value, as number_text writes the same: from which value [SI] on
 # it is the larger one
-_SECONDS = (600.0, ("min", 60.0), ("s", 1.0))
-_ENERGIES = {
+_Units = tuple[float, tuple[str, float], tuple[str, float]]
+_SECONDS: _Units = (600.0, ("min", 60.0), ("s", 1.0))
+_ENERGIES: dict[Callable[[float], str], _Units] = {
     joules: (10_000.0, ("kJ", 1e3), ("J", 1.0)),
     kilowatt_hours: (36_000.0, ("kWh", 3.6e6), ("Wh", 3600.0)),
 }
@@ -260,9 +261,7 @@ def front_chart(
     )
 
 
-def _unit(
-    values: Sequence[float], units: tuple[float, tuple[str, float], tuple[str, float]]
-) -> tuple[str, float]:
+def _unit(values: Sequence[float], units: _Units) -> tuple[str, float]:
     since, large, small = units
     return large if max(map(abs, values)) >= since else small
 
