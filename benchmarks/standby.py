@@ -11,6 +11,7 @@ against the simulated controller, which is stepped without real time.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 
@@ -38,7 +39,8 @@ Plan = tuple[tuple[int, float], ...]  # mode and when it is asked for [s]
 @dataclass(frozen=True)
 class Controller:
     """watts: on motors and in each mode. enter, stay, leave [s] of each mode. timer [s]: brakes by
-    itself.
+    itself. bus_off: the modes in which the DC link empties, to e^(-rate t) of its voltage, which
+    takes `charge` [J] from the mains to fill from empty.
     """
 
     watts: tuple[float, ...]
@@ -46,6 +48,9 @@ class Controller:
     stay: tuple[float, ...]
     leave: tuple[float, ...]
     timer: float
+    bus_off: tuple[bool, ...] = (False, False, False)
+    charge: float = 0.0
+    rate: float = 0.0
 
     def run(self, plan: Plan, wake: float, end: float) -> tuple[float, float]:
         """Energy [J] until the robot is ready and needed, at `end` at the earliest, and when that
@@ -59,6 +64,7 @@ class Controller:
         now = 0.0
         energy = 0.0
         mode = -1
+        cut = float("nan")
         for at, k in orders:
             start = max(at, now)
             if mode >= 0 and start >= wake:
@@ -68,7 +74,11 @@ class Controller:
                 power * (start - now) + power * self.enter[k] + self.watts[k + 1] * self.stay[k]
             )
             now = start + self.enter[k] + self.stay[k]
+            if self.bus_off[k] and math.isnan(cut):
+                cut = start + self.enter[k]
             mode = k
+        if not math.isnan(cut):
+            energy += self.charge * (1.0 - math.exp(-self.rate * (max(wake, now) - cut)))
         if mode >= 0:
             energy += self.watts[mode + 1] * max(wake - now, 0.0) + self.watts[0] * self.leave[mode]
             now = max(wake, now) + self.leave[mode]
@@ -174,6 +184,9 @@ def controller_of(rests: Rests) -> Controller:
         tuple(mode.stay for mode in modes),
         tuple(mode.leave for mode in modes),
         rests.timer,
+        tuple(mode.bus_off for mode in modes),
+        rests.recharge.whole,
+        rests.recharge.rate,
     )
 
 
