@@ -9,8 +9,9 @@ solver and invocation, each with as many seconds of processor time; a judge that
 checks every schedule and its energy. The laws: every schedule is valid, costs what it says, and is
 proved; the published model, with its ten segments per curve, never proves a bound above it.
 
-steady: drawn cells of one robot that tends up to six machines, cycles of one and of two parts; up
-to four machines beside brute force over all orders and modes (motors alone for four).
+steady: drawn cells of one robot that tends up to six machines, cycles of one and of two parts, a
+minute of processor time for each; up to four machines beside brute force over all orders and modes
+(motors alone for four).
 
 flexible: the bundled cell of that name at 30 parts an hour, with what is saved against the common
 cycle of the same order, which moves at 100 % and leaves waits to the controller's own timers.
@@ -28,7 +29,7 @@ from __future__ import annotations
 import argparse
 import time
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -55,6 +56,7 @@ LARGE = ((5, 10), (8, 10))
 PARTS_PER_HOUR = 30.0
 CYCLES = 4
 MACHINES = 6
+STEADY_SECONDS = 60.0  # of processor time for a cycle
 BRUTE = 4  # machines of which all orders are tried
 
 
@@ -272,31 +274,36 @@ def steady_rows(seeds: int) -> Iterator[SteadyRow]:
             brute = least_by_orders(problem, period) if machines <= BRUTE else np.nan
             for units in (1, 2):
                 begin = time.process_time()
-                cycle = cheapest_cycle(problem, period=period, units=units)
+                cycle = cheapest_cycle(problem, period=period, units=units, stopped=_late(begin))
                 seconds = time.process_time() - begin
-                assert cycle is not None
-                gap = 100.0 * (cycle.joules - cycle.bound) / cycle.joules
-                row = SteadyRow(
-                    machines,
-                    units,
-                    seed,
-                    cycle.joules,
-                    gap,
-                    brute if units == 1 else np.nan,
-                    seconds,
-                )
+                joules = np.nan if cycle is None else cycle.joules
+                gap = 100.0 if cycle is None else 100.0 * (joules - cycle.bound) / joules
+                known = brute if units == 1 else np.nan
+                row = SteadyRow(machines, units, seed, joules, gap, known, seconds)
                 print(line_of(asdict(row)), flush=True)
                 yield row
 
 
+def _late(begin: float) -> Callable[[], bool]:
+    """Whether the processor time of a cycle is over."""
+    return lambda: time.process_time() - begin > STEADY_SECONDS
+
+
 def steady_claims(rows: list[SteadyRow]) -> list[Claim]:
-    """Exact, soon, and what brute force finds."""
+    """Exact within the time of each, and what brute force finds."""
     off = [abs(row.joules - row.brute) / row.brute for row in rows if np.isfinite(row.brute)]
     return [
         at_least("steady: machines of the largest cell", max(r.machines for r in rows), "", 6),
-        at_most("steady: largest gap", max(row.gap for row in rows), "%", 1e-3),
+        *(
+            at_most(
+                f"steady: largest gap of cycles of {units}",
+                max(row.gap for row in rows if row.units == units),
+                "%",
+                1e-3,
+            )
+            for units in (1, 2)
+        ),
         at_most("steady: joules off brute force", 100.0 * max(off), "%", 0.5),
-        at_most("steady: longest processor time", max(row.seconds for row in rows), "s", 60.0),
     ]
 
 
