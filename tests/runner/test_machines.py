@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from ir_description import ProcessTimes, load_cell
 from ir_msgs_py.plc import Signal
-from ir_program_runner.machines import MOST_SIGNALS, Machines
+from ir_program_runner.machines import MOST_SIGNALS, Machines, MachineTime
 from ir_values.errors import InvalidValueError
 
 
@@ -101,3 +101,25 @@ def test_times_that_vary_are_drawn_from_their_samples_and_again_with_their_seed(
 def test_the_machines_of_a_cell_that_reports_no_process_answer_as_before() -> None:
     machines = Machines.of(load_cell("demo"))
     assert machines.next_answer == float("inf")
+
+
+@given(st.lists(st.tuples(st.none() | st.floats(0.0, 1e4), st.floats(0.0, 5.0)), min_size=1))
+def test_machines_take_the_time_of_the_plant_that_is_heard(
+    readings: list[tuple[float | None, float]],
+) -> None:
+    """It never goes back, and passes as in the plant between two readings of it, else as on the
+    clock.
+    """
+    plant: float | None = None
+    node = 0.0
+    time = MachineTime(lambda: plant, lambda: node)
+    before = time()
+    for reading, passed in readings:
+        last = plant
+        plant = reading
+        node += passed
+        advance = passed if reading is None or last is None else max(reading - last, 0.0)
+        now = time()
+        assert now - before == pytest.approx(advance, abs=1e-6)
+        assert now >= before
+        before = now

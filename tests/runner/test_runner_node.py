@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -401,6 +402,25 @@ def test_the_soft_plc_answers_for_a_machine(ros_context, ros_executor, wait_for)
     result = cell.run([move(set_signals=("open_door",)), move(wait_for=("door_open",))])
     assert result.status.code == StatusCode.SUCCESS, result.status.message
     wait_for(lambda: [message.name for message in heard] == ["door_open"])
+    cell.close()
+
+
+def test_machines_work_in_the_time_of_the_plant(ros_context, ros_executor, wait_for):
+    machines = Machines([Described("door_open", follows="open_door", delay=0.5)])
+    cell = Cell(ros_context, ros_executor, machines)
+    heard = []
+    cell.test.create_subscription(SignalMsg, "ir_program_runner/signals", heard.append, 100)
+    cell.driver.tick = 0.0  # a plant that a busy computer lets stand still
+    with cell.running([move(set_signals=("open_door",)), move(wait_for=("door_open",))], wait_for):
+        wait_for(lambda: cell.driver.log.count("drive") == 1)
+        begin = cell.driver.time
+        node = time.monotonic()
+        wait_for(lambda: time.monotonic() > node + 0.7, what="the delay is over on the clock")
+        assert not heard
+        cell.driver.tick = 0.01
+        wait_for(lambda: len(heard) == 1)
+        assert cell.driver.time - begin > 0.45
+        assert begin <= heard[0].stamp.sec + 1e-9 * heard[0].stamp.nanosec <= cell.driver.time
     cell.close()
 
 

@@ -4,7 +4,7 @@ and machines that work on a part.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Protocol
 
 import numpy as np
@@ -38,6 +38,32 @@ class CellSignal(Protocol):
     @property
     def process(self) -> str:
         """Machine whose process it reports, or empty."""
+
+
+class MachineTime:
+    """Time of the simulated machines [s]: it passes as in the plant while that is heard, which a
+    busy computer delays, else as on the node's clock.
+
+    plant: its time [s], None where it is not heard; node: a steady clock [s].
+    """
+
+    def __init__(self, plant: Callable[[], float | None], node: Callable[[], float]) -> None:
+        self._plant = plant
+        self._node = node
+        self._last = (plant(), node())
+        self._passed = 0.0
+
+    def __call__(self) -> float:
+        """Seconds since it was made; it never goes back."""
+        plant = self._plant()
+        node = self._node()
+        plant_before, node_before = self._last
+        passed = node - node_before
+        if plant is not None and plant_before is not None:
+            passed = plant - plant_before
+        self._passed += max(passed, 0.0)
+        self._last = (plant, node)
+        return self._passed
 
 
 class Machines:

@@ -35,7 +35,7 @@ from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
 from ir_program_runner.errors import ProgramError
 from ir_program_runner.fulfilment import Fulfilment, Ports
-from ir_program_runner.machines import MOST_SIGNALS, Machines
+from ir_program_runner.machines import MOST_SIGNALS, Machines, MachineTime
 from ir_program_runner.parameters import declare_parameters
 from ir_program_runner.program import (
     MOST_STEPS,
@@ -136,6 +136,7 @@ class ProgramRunnerNode(Node):
         self._waiting = Waiting(self)
         self._planner = PlannerClient(self, self._waiting, links.planner, links.response_timeout)
         self._driver = self._link_to_driver(links)
+        self._machine_time = MachineTime(self._plant_time, lambda: node_time(self))
         self._jump = ""
         back = JumpThreshold(
             min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=False
@@ -211,7 +212,7 @@ class ProgramRunnerNode(Node):
 
     def _driver_is_known(self) -> bool:
         """Whether the meter and the number of the last stop have been heard, and time passes."""
-        return not self._driver.silent and self._driver.stops is not None and self._now() > 0.0
+        return not self._driver.silent and self._driver.stops is not None and node_time(self) > 0.0
 
     async def _run_steps(self, goal: ServerGoalHandle, program: Program) -> ProgramResult:
         feedback = self.create_timer(_FEEDBACK_PERIOD, lambda: self._publish_feedback(goal))
@@ -255,9 +256,10 @@ class ProgramRunnerNode(Node):
             send_wake_packet=self._send_wake_packet,
         )
 
-    def _now(self) -> float:
-        """Time of the machines [s]: they answer with or without a driver."""
-        return node_time(self)
+    def _plant_time(self) -> float | None:
+        """Time of the plant [s], None where no driver is heard: machines answer without one."""
+        heard = self._driver.stamp_ns and not self._driver.silent
+        return self._driver.plant_time if heard else None
 
     def _clock_jumped(self, jump: TimeJump) -> None:
         self._jump = f"the clock jumped back by {-jump.delta.nanoseconds * 1e-9:.3f} s"
@@ -275,7 +277,7 @@ class ProgramRunnerNode(Node):
         return Status.success()
 
     def _set_signal(self, signal: Signal) -> None:
-        self._machines.set(signal, self._now())
+        self._machines.set(signal, self._machine_time())
         self._machine_signals.publish(signal_to_msg(self._stamped(signal)))
 
     def _hear_signals(self, messages: Sequence[SignalMsg]) -> None:
@@ -284,7 +286,7 @@ class ProgramRunnerNode(Node):
 
     def _hear_signal(self, msg: SignalMsg) -> None:
         try:
-            self._machines.hear(signal_from_msg(msg), self._now())
+            self._machines.hear(signal_from_msg(msg), self._machine_time())
         except InvalidValueError as error:
             self.get_logger().warning(f"a signal is ignored: {error}", throttle_duration_sec=1.0)
         self._waiting.look()
@@ -309,7 +311,7 @@ class ProgramRunnerNode(Node):
 
     def _let_machines_answer(self) -> None:
         self._take_peers()
-        for signal in self._machines.take_answers(self._now()):
+        for signal in self._machines.take_answers(self._machine_time()):
             self._signals.publish(signal_to_msg(self._stamped(signal)))
 
     def _diagnose(self) -> None:
@@ -318,7 +320,9 @@ class ProgramRunnerNode(Node):
         )
 
     def _stamped(self, signal: Signal) -> Signal:
-        return Signal(signal.name, signal.value, self.get_clock().now().nanoseconds)
+        """With the time at which it holds, in the driver's stamps where one is heard."""
+        stamp = 0 if self._driver.silent else self._driver.stamp_ns
+        return Signal(signal.name, signal.value, stamp or self.get_clock().now().nanoseconds)
 
     def _begin(self, index: int) -> None:
         assert self._progress is not None
