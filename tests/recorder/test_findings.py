@@ -127,6 +127,19 @@ def test_pauses_are_checked_too(analysis: Analysis) -> None:
         assert check.ok == ok
 
 
+def test_a_pause_may_last_longer_by_what_a_busy_computer_delayed_the_plant(
+    analysis: Analysis,
+) -> None:
+    pause = next(s for s in analysis.steps if s.step.movement.is_pause)
+    end = pause.step.start + pause.step.movement.duration + 0.6
+    late = replace(pause, step=replace(pause.step, end=end))
+    for slip, holds in ((0.0, False), (0.05, False), (0.2, True)):
+        steps = (replace(late, slip=slip),)
+        (check,) = named(findings(replace(analysis, steps=steps)), "duration of")
+        assert check.ok == holds
+        assert ("busy computer" in check.reason) == (slip > 0.1)
+
+
 def test_a_plant_that_is_not_the_model_is_held_against_the_interval_of_a_pause(
     analysis: Analysis,
 ) -> None:

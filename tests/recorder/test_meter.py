@@ -69,3 +69,17 @@ def test_the_rectifiers_loss_is_counted_and_the_capacitors_by_the_plants_own_mai
     )
     assert damaged.steps[0].stored_energy == 0.0
     assert any("power.yaml can't be read" in problem for problem in damaged.problems)
+
+
+@pytest.mark.parametrize(("lag", "slip"), [(0.0, 0.0), (0.3, 0.3), (-0.3, 0.3), (60.0, 1.0)])
+def test_the_plant_slips_by_what_it_falls_behind_or_makes_up_for(
+    new_run: Callable[[], Any], tmp_path: Path, lag: float, slip: float
+) -> None:
+    run = new_run()
+    run.rest(2.0, Mode.BUS_POWER_OFF, HOME, "gripper")
+    power = read_recording(run.record(tmp_path / "a.mcap")).power
+    assert power is not None
+    behind = 0.5 + lag * np.clip(power.time - 0.5, 0.0, 1.0)
+    meter = Meter(replace(power, heard=power.time + behind))
+    assert meter.slip(0.4, 1.6) == pytest.approx(slip)
+    assert meter.slip(1.6, 1.9) == pytest.approx(0.0, abs=1e-9)

@@ -401,6 +401,7 @@ class _Analyser:
             motors_power=self._resting(MOTORS, step, cell),
             tool_deviation=self._deviation(step),
             clearance=clearance,
+            slip=meter.slip(start, end) if meter else 0.0,
         )
 
     def _indirect(self, cell: Cell | None) -> IndirectMeter | None:

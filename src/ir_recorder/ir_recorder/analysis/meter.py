@@ -19,6 +19,9 @@ from ir_values.arrays import FloatArray
 # linear between them.
 
 
+_SLIP_MAX = 1.0  # s: farther apart in one step, plant and recorder have clocks of different speed
+
+
 class Meter:
     """Cumulative energies over the readings; times [s] outside of them count as the nearest
     reading.
@@ -27,6 +30,7 @@ class Meter:
     def __init__(self, power: PowerSeries) -> None:
         self.time = power.time
         self.power = power.power
+        self._behind = power.heard - power.time
         self._volts = power.bus_voltage
         step = np.diff(power.time, prepend=power.time[:1])
         self._energy = power.energy - power.energy[:1]
@@ -51,6 +55,14 @@ class Meter:
         most = float(self._energy[after[1]] - self._energy[before[0]])
         read = self.energy(start, end)
         return max(most - read, read - least)
+
+    def slip(self, start: float, end: float) -> float:
+        """By how much the plant fell behind the recorder's clock meanwhile, or made up for it [s]:
+        a busy computer delays the plant and the answers of the nodes.
+        """
+        first, last = np.searchsorted(self.time, [start, end])
+        behind = self._behind[max(first - 1, 0) : last + 1]
+        return min(float(np.ptp(behind)), _SLIP_MAX) if len(behind) else 0.0
 
     def base(self, start: float, end: float) -> float:
         """J of controller, drives and tool."""

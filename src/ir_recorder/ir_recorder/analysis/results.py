@@ -95,7 +95,8 @@ class StepResult:
     torque; second_opinion [J]: from positions with torques by Pinocchio, where it is installed;
     stored_energy [J]: in the capacitors at the
     start; lost_charge [J]: that the plan counted on in them, and that had gone as the step began
-    late; motors_power [W]: at rest with motors on, by the data; tool_deviation [m]: largest between
+    late; slip [s]: by which the plant's time slipped against the recorder's clock; motors_power
+    [W]: at rest with motors on, by the data; tool_deviation [m]: largest between
     commanded and simulated tcp. NaN where it wasn't recorded. clearance is None for pauses.
     """
 
@@ -115,6 +116,7 @@ class StepResult:
     tool_deviation: float
     clearance: StepClearance | None
     lost_charge: float = 0.0
+    slip: float = 0.0
 
     @property
     def seconds(self) -> float:

@@ -320,6 +320,7 @@ class _Reader:
             columns.numbers("tool_power"),
             columns.numbers("rectifier_loss"),
             columns.numbers("joint_temperature", len(names.JOINT_NAMES)),
+            self._seconds(channel.log_time),
             next((name for name in reversed(columns.texts("plant")) if name), ""),
         )
 

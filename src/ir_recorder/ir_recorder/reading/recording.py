@@ -55,8 +55,9 @@ class PowerSeries(_ReadOnlyArrays):
     n) W at the DC bus, joint_torque (N, n) Nm; tool_power (N,) W, part of base_power;
     rectifier_loss (N,) W; joint_temperature (N, n) deg C. What the plant doesn't have is NaN.
 
-    A power is the mean since the reading before. plant: what the meter measures, "" where it has no
-    name.
+    A power is the mean since the reading before. heard (N,) [s]: when the recorder had each
+    reading, which is later than its time by what the plant lagged. plant: what the meter measures,
+    "" where it has no name.
     """
 
     time: FloatArray
@@ -72,6 +73,7 @@ class PowerSeries(_ReadOnlyArrays):
     tool_power: FloatArray
     rectifier_loss: FloatArray
     joint_temperature: FloatArray
+    heard: FloatArray
     plant: str = ""
 
 
