@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 from dataclasses import replace
 
 import numpy as np
+import pybullet
 import pytest
 from scipy.spatial.transform import Rotation
 
@@ -217,3 +219,21 @@ def test_bullet_computes_with_every_plant_and_load_and_prints_nothing(cell, capf
         assert np.abs(arm.mass_matrix(home.tolist()) - H).max() < 1e-9 * np.abs(H).max(), seed
         arm.close()
     assert capfd.readouterr() == ("", "")
+
+
+def test_an_arm_that_is_not_used_any_more_lets_its_server_go(cell):
+    """PyBullet has a thousand of them, of 30 MB each."""
+
+    def servers():
+        return sum(bool(pybullet.isConnected(client)) for client in range(1024))
+
+    gc.collect()
+    before = servers()
+    for _ in range(3):
+        arm = BulletArm(cell.robot, 0.001, np.eye(4))
+        for _ in range(2):  # it gets another server
+            arm.carry((), [0.0] * 6)
+            assert servers() == before + 1
+        del arm
+        gc.collect()
+        assert servers() == before

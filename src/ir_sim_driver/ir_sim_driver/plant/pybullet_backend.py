@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import weakref
 from collections.abc import Sequence
 from operator import add, sub
 from typing import Any, NamedTuple, cast
@@ -175,6 +176,7 @@ class BulletArm:
         self._gravity = (base_pose[:3, :3].T @ np.array([0.0, 0.0, -GRAVITY])).tolist()
         self._bullet = _pybullet()
         self._client = -1
+        self._release = weakref.finalize(self, _disconnect, self._bullet, self._client)
         self._errors = (
             self._bullet.error,
             SystemError,
@@ -188,8 +190,10 @@ class BulletArm:
         self._joints = list(range(robot.n))
 
     def close(self) -> None:
-        """Let go of the physics server."""
-        self._bullet.disconnect(physicsClientId=self._client)
+        """Let go of the physics server, of some 30 MB; an arm that is not used any more does it by
+        itself.
+        """
+        self._release()
 
     def connect_again(self) -> None:
         """Start the physics server again when it is gone."""
@@ -280,8 +284,10 @@ class BulletArm:
             self._bullet.disconnect(physicsClientId=self._client)
             self._client = old
             raise BackendError(f"PyBullet can't be given the robot: {error}") from error
-        if self._bullet.isConnected(old):
-            self._bullet.disconnect(physicsClientId=old)
+        if self._client == old:  # that server had gone, and its number is given again
+            self._release.detach()
+        self._release()
+        self._release = weakref.finalize(self, _disconnect, self._bullet, self._client)
         self._prepare()
 
     def _load(self, text: str) -> int:
@@ -327,6 +333,11 @@ def _pybullet() -> Any:
     except ImportError as error:
         raise BackendError(f"PyBullet is not installed ({error}): use backend ideal") from error
     return pybullet
+
+
+def _disconnect(bullet: Any, client: int) -> None:
+    if bullet.isConnected(client):
+        bullet.disconnect(physicsClientId=client)
 
 
 def _connect(bullet: Any, dt: float, gravity: list[float]) -> int:
