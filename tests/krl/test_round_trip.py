@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ir_description import Cell, bundled_cells, load_cell
+from ir_description import Cell, ProgramStep, bundled_cells, load_cell
 from ir_description.poses import abc_from_rotation
 from ir_krl import STYLES, follow, parse, plc_input, read_plc_table
 from ir_msgs_py.modes import REST_MODES
 from ir_planner import Planner, RequestError
+from ir_planner.before_after import before_after, today_of_krl
 from ir_planner.krl import EvaluatedProgram, KrlExport, evaluate_krl, export_krl, tool_in_flange
 from ir_planner.krl.surroundings import principal_axes
 
@@ -109,6 +110,38 @@ def test_every_sequence_of_modes_comes_back(demo: tuple[Planner, Any], seed: int
     assert any("without the PLC's table" in note.text for note in plain.notes)
     assert plain.report.duration == pytest.approx(export.seconds, abs=0.02)
     assert not any(one.power_mode for one in plain.steps)
+
+
+@pytest.mark.parametrize("free", [True, pytest.param(False, marks=pytest.mark.long)])
+def test_an_export_leaves_nothing_to_save_but_what_the_cells_program_fixes(free: bool) -> None:
+    cell = load_cell("demo")
+    if free:
+        cell = replace(cell, program=tuple(one for step in cell.program for one in freed(step)))
+    planner = Planner(cell, clock=lambda: 0.0)
+    plan = planner.plan_program(start=cell.posture("park"))
+    assert plan.status.ok
+    export = export_krl(planner, plan.movements, "cycle")
+    compared = before_after(planner, today_of_krl(again(planner, export)))
+    assert compared.planned.found
+    fixed = [note for note in compared.notes if "the cell's own program fixes" in note]
+    moving = [one for one in compared.changes if not one.name.startswith("pause")]
+    lost = export.joules - plan.report.energy
+    assert sum(one.saving.saved for one in moving) <= lost + 1e-3 * plan.report.energy
+    if free:
+        assert not fixed
+        assert compared.planned.saving.saved <= lost + 1e-3 * plan.report.energy
+    else:
+        modes = "BUS_POWER_OFF (180 s); HIBERNATION (1800 s)"
+        assert modes in fixed[0]
+        assert compared.planned.saving.share > 0.05
+
+
+def freed(step: ProgramStep) -> list[ProgramStep]:
+    """A step of a program whose standstill may be spent in any mode."""
+    if step.dwell == 0.0:
+        return [step]
+    pause = ProgramStep("PAUSE", dwell=step.dwell, power_mode="AUTO")
+    return [pause] if step.kind == "PAUSE" else [replace(step, dwell=0.0), pause]
 
 
 @pytest.mark.long

@@ -20,6 +20,7 @@ from ir_planner.before_after.today_steps import (
     assumed_doors,
     costed_steps,
     doors_at_the_start,
+    freed_rests,
 )
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
@@ -67,8 +68,9 @@ def before_after(
     sides = [asking.planned(SAME, before.seconds, before), asking.planned(FREE, 0.0, before)]
     if _differs(cycle_time, before.seconds):
         sides.append(asking.planned(LINE, cycle_time, waiting))
+    freed = freed_rests(planner.cell, asked)
     return asking.answer(
-        today.name, today.kind, before, sides, (*today.notes, *asked.notes, *stood)
+        today.name, today.kind, before, sides, (*today.notes, *asked.notes, *stood, *freed)
     )
 
 

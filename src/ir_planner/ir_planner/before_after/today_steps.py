@@ -11,6 +11,7 @@ from ir_planner.checks import evaluate_trajectory
 from ir_planner.krl import posture_at, station_at
 from ir_planner.program import (
     AUTO,
+    MOTORS,
     Charge,
     Doors,
     Pause,
@@ -31,6 +32,7 @@ from ir_values.arrays import FloatArray
 
 POINTS = "todays_points"  # the equipment that stations of today's own stand at
 _ZONE = 1e-3  # m: there is no machine
+_SAME_PAUSE = 0.05  # s
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,6 +248,26 @@ class _Stops:
         """What was added, in words."""
         names = ", ".join(name for name, _ in self._added)
         return [f"stops that are no station of the cell: {names}"] if names else []
+
+
+def freed_rests(cell: Cell, asked: AskedProgram) -> tuple[str, ...]:
+    """What the cell's own program fixes of today's pauses: the planner's programs are free there,
+    so that they may save against a plan of the cell's program as well.
+    """
+    today = [one.step.dwell for one in asked.steps if one.step.kind == "PAUSE"]
+    fixed: dict[str, list[str]] = {}
+    for step in cell.program:
+        mode = step.power_mode or MOTORS
+        stands = any(abs(step.dwell - seconds) < _SAME_PAUSE for seconds in today)
+        if step.dwell > 0.0 and stands and mode != AUTO:
+            fixed.setdefault(mode, []).append(f"{step.dwell:g}")
+    if not fixed:
+        return ()
+    said = "; ".join(f"{mode} ({', '.join(dict.fromkeys(s))} s)" for mode, s in fixed.items())
+    return (
+        "the planner's programs spend every pause in the modes of least energy; the cell's own "
+        f"program fixes the mode of some, which is freed here: {said}",
+    )
 
 
 # Today's program costed as a planned one is: the same loads, the same doors, the capacitor's
