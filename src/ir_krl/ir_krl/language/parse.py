@@ -24,6 +24,12 @@ TEXT_MAX = 4_000_000
 """Characters of one file that are read: a program of this size has some 100,000 lines."""
 
 _COMMENT = re.compile(r"\"[^\"\n]*\"|;[^\n]*|^&[^\n]*", re.MULTILINE)
+_STAMP = re.compile(
+    r"%[RV] *(\d+)\.(\d+)[.\d]* *, *%MKUKATPBASIS|IlfProvider=kukaroboter\.basistech",
+    re.IGNORECASE,
+)
+"""What inline forms say of the version that wrote them; those with a provider are of KSS 8.5."""
+_PROVIDER = (8, 5)
 _SPELLED = {  # what a user calls the parser's terminals
     "_NL": "the end of the line",
     "NAME": "a name",
@@ -118,11 +124,14 @@ class Routine:
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """One file: its routines in their order, and the bodies of its data lists."""
+    """One file: its routines in their order, the bodies of its data lists, and the versions of the
+    system software that wrote its inline forms.
+    """
 
     file: str
     routines: tuple[Routine, ...]
     data: tuple[Tree, ...]
+    versions: frozenset[tuple[int, int]] = frozenset()
 
 
 def parse(text: str, file: str) -> Source:
@@ -146,7 +155,10 @@ def parse(text: str, file: str) -> Source:
         raise KrlSyntaxError(sentence, Place(file, error.line, column)) from None
     routines = [_routine(unit, file) for unit in units if unit.data in ("routine", "function")]
     data = tuple(unit.children[-1] for unit in units if unit.data == "data_list")
-    return Source(file, tuple(routines), data)
+    versions = frozenset(
+        (int(found[1]), int(found[2])) if found[1] else _PROVIDER for found in _STAMP.finditer(text)
+    )
+    return Source(file, tuple(routines), data, versions)
 
 
 def place_of(node: Tree | Word, file: str) -> Place:

@@ -10,7 +10,7 @@ from ir_description.poses import inverse
 from ir_krl.errors import KrlRunError, Place
 from ir_krl.run.memory import Memory, Step
 from ir_krl.run.notes import Effect
-from ir_krl.run.system import AXES, DEFAULTS, FULL, NULL, all_axes
+from ir_krl.run.system import DEFAULTS, FULL, NULL, all_axes
 from ir_krl.run.values import (
     Array,
     Structure,
@@ -149,8 +149,10 @@ class Library:
                 self._axis_speed(self._noted("PDAT_ACT", "VEL", FULL, place))
                 self._axis_data(place)
             case "CP_DAT":
-                otherwise = self._default("DEF_VEL_CP")
-                self._tool_speed(self._noted("LDAT_ACT", "VEL", otherwise, place))
+                if _holds(self._own("LDAT_ACT", place), "VEL"):
+                    self._tool_speed(self._noted("LDAT_ACT", "VEL", 0.0, place))
+                else:
+                    self._tool_speed(self._default("DEF_VEL_CP", "$VEL.CP"))
                 self._tool_data(place)
             case "VEL_PTP":
                 self._axis_speed(amount())
@@ -179,28 +181,33 @@ class Library:
                 self._memory.noted(place, text, Effect.SPEEDS)
         return 0
 
-    def _default(self, name: str) -> float:
-        """A figure of $config.dat, which may be the program's own."""
+    def _default(self, name: str, used: str = "") -> float:
+        """A figure of $config.dat, which may be the program's own; used: the system variable that
+        is set with it, so that motions which follow from it say where it isn't.
+        """
         value = self._memory.peek(name)
+        if used:
+            self._memory.chosen[used] = self._memory.assumed.get(name)
         given = value if isinstance(value, int | float) else DEFAULTS[name]
         return number(given, name, Place())
 
     def _initialised(self) -> None:
         """BAS(#INITMOV): speeds, approximation, tool 1, base 0 as $config.dat has them."""
         memory = self._memory
-        memory.shared["$VEL_AXIS"] = all_axes(self._default("DEF_VEL_PTP"))
+        memory.shared["$VEL_AXIS"] = all_axes(FULL)
         memory.shared["$ACC_AXIS"] = all_axes(FULL)
-        velocity, acceleration, apo = (
-            {part: self._default(name) for part, name in parts}
-            for parts in (
-                (("CP", "DEF_VEL_CP"), ("ORI1", "DEF_VEL_ORI1"), ("ORI2", "DEF_VEL_ORI2")),
-                (("CP", "DEF_ACC_CP"), ("ORI1", "DEF_ACC_ORI1"), ("ORI2", "DEF_ACC_ORI2")),
-                tuple((part, f"DEF_APO_{part}") for part in ("CPTP", "CDIS", "CVEL", "CORI")),
-            )
-        )
-        self._set("$VEL", Structure(dict(velocity)))
-        self._set("$ACC", Structure(dict(acceleration)))
-        self._set("$APO", Structure(dict(apo)))
+        self._axis_speed(FULL)
+        self._set("$ACC_AXIS", FULL)
+        for variable, parts in (
+            ("VEL", ("CP", "ORI1", "ORI2")),
+            ("ACC", ("CP", "ORI1", "ORI2")),
+            ("APO", ("CPTP", "CDIS", "CVEL", "CORI")),
+        ):
+            given: dict[str, Value] = {
+                part: self._default(f"DEF_{variable}_{part}", f"${variable}.{part}")
+                for part in parts
+            }
+            self._set(f"${variable}", Structure(given))
         self._set("$ORI_TYPE", Symbol("VAR"))
         self._set("$IPO_MODE", Symbol("BASE"))
         self._set("$CIRC_TYPE", self._memory.peek("DEF_CIRC_TYP") or Symbol("BASE"))
@@ -248,7 +255,8 @@ class Library:
             ("ORI1", "DEF_ACC_ORI1"),
             ("ORI2", "DEF_ACC_ORI2"),
         ):
-            self._set(f"$ACC.{part}", self._default(name) * min(share, FULL) / FULL)
+            full = self._default(name, f"$ACC.{part}")
+            self._set(f"$ACC.{part}", full * min(share, FULL) / FULL)
 
     def _frames(self, place: Place) -> None:
         """Tool, load and base that the inline form's FDAT_ACT names."""
@@ -295,18 +303,14 @@ class Library:
     def _set(self, name: str, value: Value) -> None:
         """A system variable; of an array of axes all of them."""
         variable, _, component = name.partition(".")
-        chosen = self._memory.chosen.pop(name, None)
         held = self._memory.shared.get(variable)
         if isinstance(held, Array):
-            for j in range(1, AXES + 1):
-                held.elements[(j,)] = value
-            return
+            value = Array(dict.fromkeys(held.elements, value), held.kind, held.sizes)
         path: tuple[Step, ...] = (
             ((variable, None), (component, None)) if component else ((variable, None),)
         )
         self._memory.set(path, value, Place())
-        if chosen is not None:
-            self._memory.assumed[name] = chosen
+        self._memory.take_chosen(name)
 
     def _state(self, arguments: Arguments, place: Place) -> Value:
         """VARSTATE("NAME"): whether a variable has a value."""
@@ -324,8 +328,10 @@ class Library:
 
     def _axis_speed(self, percent: float) -> float:
         """$VEL_AXIS of all axes, `percent` of DEF_VEL_PTP, which it is at most."""
-        share = self._default("DEF_VEL_PTP") * min(percent, FULL) / FULL
+        share = self._default("DEF_VEL_PTP", "$VEL_AXIS") * min(percent, FULL) / FULL
+        chosen = self._memory.chosen.get("$VEL_AXIS")
         self._set("$VEL_AXIS", share)
+        self._memory.chosen["$VEL_AXIS"] = chosen  # of an assignment to one of the axes
         return share
 
     def _joint_acceleration(self, arguments: Arguments, place: Place) -> Value:
@@ -338,7 +344,7 @@ class Library:
         share = number(_field(arguments, "AXIS_VEL", FULL), "AXIS_VEL", place)
         self._set("$VEL_AXIS", min(share, FULL))
         speed = number(_first(arguments, "SVEL_CP", place), "SVEL_CP", place)
-        turning = self._default("DEF_VEL_ORIS")
+        turning = self._default("DEF_VEL_ORIS", "$VEL.ORI1")
         return Structure({"CP": min(speed, self._fastest(speed)), "ORI1": turning})
 
     def _path_acceleration(self, arguments: Arguments, place: Place) -> Value:
@@ -346,8 +352,9 @@ class Library:
         percent = min(number(_field(arguments, "AXIS_ACC", own), "AXIS_ACC", place), FULL)
         self._set("$ACC_AXIS", percent)
         share = percent / FULL
-        turning = self._default("DEF_ACC_ORIS") * share
-        return Structure({"CP": self._default("DEF_ACC_CP") * share, "ORI1": turning})
+        turning = self._default("DEF_ACC_ORIS", "$ACC.ORI1") * share
+        along = self._default("DEF_ACC_CP", "$ACC.CP") * share
+        return Structure({"CP": along, "ORI1": turning})
 
     def _axis_approximation(self, arguments: Arguments, place: Place) -> Value:
         """SAPO_PTP: millimetres, and a share of the motion where APO_MODE is #CPTP."""
@@ -355,7 +362,7 @@ class Library:
         mode = _field(arguments, "APO_MODE", "")
         if mode == Symbol("CPTP"):
             return Structure({"CDIS": _FAR, "CPTP": distance})
-        share = FULL if mode else self._default("DEF_APO_CPTP")
+        share = FULL if mode else self._default("DEF_APO_CPTP", "$APO.CPTP")
         return Structure({"CDIS": distance, "CPTP": share})
 
     def _load(self, index: int, place: Place) -> Value:

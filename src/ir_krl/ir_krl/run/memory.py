@@ -61,10 +61,11 @@ class Memory:
     """`shared` holds what is known everywhere, `modules` the data lists by the names of their
     modules, `scopes` the calls that run. module: whose statements run; listed: all names that data
     lists declare; types: components of structures; assumed: values that the program didn't bring,
-    by name or name[index]; chosen: the same of $TOOL and $BASE that a function has just found;
+    by name or name[index]; chosen: the same of system variables that a function has just found;
     noted: hears of those that are used; guesses: how many were; watched: see `watch`. settings:
     what a user has set, which variables of a call begin with too; beside: what triggers have set
-    since the advance run stopped last; ahead: it is ahead of a motion since then.
+    since the advance run stopped last; ahead: it is ahead of a motion since then. delivered: what
+    is said of figures of $config.dat that were used as controllers are delivered, and where first.
     """
 
     shared: dict[str, Value]
@@ -80,6 +81,7 @@ class Memory:
     settings: dict[str, Value] = field(default_factory=dict)
     beside: set[str] = field(default_factory=set)
     ahead: bool = False
+    delivered: dict[str, Place] = field(default_factory=dict)
     types: dict[str, Mapping[str, str]] = field(default_factory=lambda: dict(TYPES))
 
     def enter(self, values: dict[str, Value], names: Iterable[str]) -> None:
@@ -223,9 +225,14 @@ class Memory:
         """Say that a value which isn't the program's is used."""
         if index is not None and len(index) == 1 and f"{name}[{index[0]}]" in self.assumed:
             name = f"{name}[{index[0]}]"
-        if name in self.assumed:
-            self.guesses += 1
-            self.noted(place, self.assumed[name].text, self.assumed[name].effect)
+        if name not in self.assumed:
+            return
+        self.guesses += 1
+        assumed = self.assumed[name]
+        if assumed.delivered:
+            self.delivered.setdefault(assumed.text, place)
+        else:
+            self.noted(place, assumed.text, assumed.effect)
 
     def get(self, path: tuple[Step, ...], place: Place) -> Value:
         """The value at a path such as XP1.X or BASE_DATA[2]. Raises KrlRunError."""
@@ -235,6 +242,8 @@ class Memory:
             written = name if index is None else f"{name}[{', '.join(map(str, index))}]"
             return Unknown(".".join([written, *(part for part, _ in rest)]))
         self._guessed(name, index, place)
+        if rest:
+            self._guessed(f"{name}.{rest[0][0]}", None, place)
         if home is not self.shared and home is self.modules.get(self._elsewhere(name)):
             text = f"{name} is taken from the data list {self._elsewhere(name)}, it isn't GLOBAL"
             self.noted(place, text, Effect.PLACES)
@@ -258,9 +267,7 @@ class Memory:
         home: dict[str, Value] = self._home(name)
         self._watch(home, name)
         if self.assumed:
-            self.assumed.pop(name, None)
-            if index is not None:
-                self.assumed.pop(f"{name}[{', '.join(map(str, index))}]", None)
+            self._known(name, index, rest)
         holder = home
         parts: Mapping[str, str] = {}
         for (part, part_index), following in zip(path, [*rest, None], strict=True):
@@ -283,6 +290,24 @@ class Memory:
             held = _structure_at(elements, key, part, kind, place)
             holder = held.fields
             parts = self.types.get(held.kind, {})
+
+    def take_chosen(self, name: str) -> None:
+        """A variable has been set by what a function found: it is an assumption where that was."""
+        for key in [one for one in self.chosen if one == name or one.startswith(f"{name}.")]:
+            assumed = self.chosen.pop(key)
+            if assumed is not None:
+                self.assumed[key] = assumed
+
+    def _known(self, name: str, index: tuple[int, ...] | None, rest: list[Step]) -> None:
+        """What is set is no assumption any more."""
+        self.assumed.pop(name, None)
+        if index is not None:
+            self.assumed.pop(f"{name}[{', '.join(map(str, index))}]", None)
+        elif rest:
+            self.assumed.pop(f"{name}.{rest[0][0]}", None)
+        elif name.startswith("$"):
+            for part in [one for one in self.assumed if one.startswith((f"{name}.", f"{name}["))]:
+                del self.assumed[part]
 
     def _home(self, name: str) -> dict[str, Value]:
         """Where a variable is, or would be."""

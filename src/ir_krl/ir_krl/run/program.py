@@ -16,7 +16,7 @@ from ir_krl.run.memory import Memory, SignalRange, Signals, module_of
 from ir_krl.run.motions import Motions, Moving
 from ir_krl.run.notes import Effect, Note, worst_first
 from ir_krl.run.standing import AXES_NOW, PLACE_NOW, Kinematics, Standing
-from ir_krl.run.system import Assumption, assumed_variables, system_variables
+from ir_krl.run.system import Assumption, assumed_variables, form_age, system_variables
 from ir_krl.run.texts import TEXT_FUNCTIONS, text_value
 from ir_krl.run.values import TYPES, Array, Unknown, Value, copied, typed
 from ir_values.arrays import FloatArray
@@ -128,7 +128,8 @@ def follow(
     if first is None:
         there = ", ".join(routines.names[:8]) or "none"
         raise KrlRunError(f"there is no routine {name or 'at all'}; routines: {there}")
-    memory = Memory(system_variables(home, tool), assumed_variables())
+    forms = form_age({one for source in sources for one in source.versions})
+    memory = Memory(system_variables(home, tool, forms), assumed_variables(forms))
     for source in sources:
         for body in (*source.data, *(one.body for one in source.routines)):
             memory.types |= _structures(body)
@@ -148,6 +149,7 @@ def follow(
         pass  # a note says so
     except RecursionError:
         raise KrlRunError(NESTED, Place(run.expressions.file)) from None
+    run.name_delivered()
     notes = worst_first(run.notes)
     return Followed(name, tuple(run.commands), notes, run.signals, tuple(run.unknown.values()))
 
@@ -244,6 +246,14 @@ class _Run(Moving):
             self._statement(statement)
             whole = self.memory.get(((name, None),), self.place(statement))
             self.memory.settings[name] = copied(whole)
+
+    def name_delivered(self) -> None:
+        """Note the figures of $config.dat that were used as controllers are delivered."""
+        said = self.memory.delivered
+        if said:
+            named = ", ".join(said)
+            text = f"of $config.dat, not in the files, as delivered: {named}; --set 'NAME=…'"
+            self.note_at(next(iter(said.values())), text, Effect.SPEEDS)
 
     def background(self, sources: Sequence[Source]) -> None:
         """What programs beside this one set is known as it stands at the start, and assumed."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 
@@ -11,6 +13,7 @@ from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES, Array, Structure, Symbol,
 from ir_values.arrays import FloatArray
 
 AXES = 6
+_WITH_APO_MODE = (8, 3)  # KSS
 FULL = 100.0  # %
 TOOLS = 128  # numbers of TOOL_DATA and LOAD_DATA that a KR C4 has at most
 BASES = 128  # numbers of BASE_DATA
@@ -143,14 +146,31 @@ DEFAULTS: dict[str, Value] = {
     "DEF_GEAR_JERK": 50.0,
 }
 """Of the configuration file as a KR C4 is delivered with; a $config.dat that is given counts."""
+DELIVERED: dict[str, str] = {
+    "DEF_VEL_PTP": "%",
+    "DEF_VEL_CP": "m/s",
+    "DEF_VEL_ORI1": "deg/s",
+    "DEF_VEL_ORIS": "deg/s",
+    "DEF_ACC_CP": "m/s^2",
+    "DEF_ACC_ORI1": "deg/s^2",
+    "DEF_ACC_ORIS": "deg/s^2",
+    "DEF_APO_CPTP": "%",
+    "DEF_APO_CDIS": "mm",
+    "DEF_APO_CORI": "deg",
+    "DEF_APO_CVEL": "%",
+}
+"""Units of those that motions follow from: where such a motion is driven, they are named."""
 
 
 @dataclass(frozen=True)
 class Assumption:
-    """A value that the program doesn't bring: what is said of it where it is used."""
+    """A value that the program doesn't bring: what is said of it where it is used. delivered: the
+    name of the figure of $config.dat that it is, of which one sentence names all.
+    """
 
     text: str
     effect: Effect
+    delivered: str = ""
 
 
 def _modes(mode: str) -> dict[str, Value]:
@@ -236,10 +256,31 @@ def mode_variables(name: str, value: Value) -> dict[str, Value]:
     return _modes(told[name]) if name in told and value is True else {}
 
 
-def system_variables(home: FloatArray, tool: FloatArray) -> dict[str, Value]:
+class FormAge(Enum):
+    """Which system software wrote inline forms, as far as PDEFAULT hangs on it: its APO_DIST is in
+    mm (APO_MODE #CDIS) from KSS 8.3 on, in % before.
+    """
+
+    OLD = "100 %, as before KSS 8.3, whose inline forms these are"
+    NEW = "100 mm, as from KSS 8.3 on, whose inline forms these are"
+    OPEN = "100 mm, as from KSS 8.3 on; older ones have 100 %"
+
+
+def form_age(versions: Collection[tuple[int, int]]) -> FormAge:
+    """By the versions that a program's inline forms name; OPEN where they name none, or both."""
+    newer = {one >= _WITH_APO_MODE for one in versions}
+    if len(newer) != 1:
+        return FormAge.OPEN
+    return FormAge.NEW if newer.pop() else FormAge.OLD
+
+
+def system_variables(
+    home: FloatArray, tool: FloatArray, forms: FormAge = FormAge.OPEN
+) -> dict[str, Value]:
     """Variables at the start: `home` (6,) [rad] is XHOME, `tool` (4, 4) [m] in the flange every
     tool number whose data the program doesn't bring.
     """
+    apo_mode: dict[str, Value] = {} if forms is FormAge.OLD else {"APO_MODE": Symbol("CDIS")}
     angles: dict[str, Value] = {
         name: float(angle) for name, angle in zip(AXIS_NAMES, np.degrees(home), strict=True)
     }
@@ -268,14 +309,14 @@ def system_variables(home: FloatArray, tool: FloatArray) -> dict[str, Value]:
         "BASE_DATA": Array({(n,): Structure(dict(NULL)) for n in range(1, BASES + 1)}),
         "XHOME": Structure(dict(angles), "E6AXIS"),
         "$H_POS": Structure(dict(angles), "E6AXIS"),
-        "PDEFAULT": Structure({**percent, "APO_MODE": Symbol("CDIS"), "GEAR_JERK": 50.0}, "PDAT"),
+        "PDEFAULT": Structure({**percent, **apo_mode, "GEAR_JERK": 50.0}, "PDAT"),
         "LDEFAULT": Structure({**path, "AXIS_VEL": FULL, "AXIS_ACC": FULL}, "LDAT"),
         "FHOME": Structure({"TOOL_NO": 1, "BASE_NO": 0, "IPO_FRAME": Symbol("BASE")}, "FDAT"),
         "$OUT": Array(),
     }
 
 
-def assumed_variables() -> dict[str, Assumption]:
+def assumed_variables(forms: FormAge = FormAge.OPEN) -> dict[str, Assumption]:
     """Those of `system_variables` that a controller may have otherwise, by name or name[index]."""
     found = {
         name: Assumption(f"{name} is taken as {_spelled(value)}: --set '{name}=…'", Effect.MOTIONS)
@@ -285,11 +326,22 @@ def assumed_variables() -> dict[str, Assumption]:
     found["XHOME"] = Assumption(f"XHOME {home}", Effect.PLACES)
     found["$H_POS"] = Assumption(f"$H_POS {home}", Effect.PLACES)
     apo = "no $APO is set: as BAS(#INITMOV) sets it, 50 % and 3 mm"
-    found["$APO"] = Assumption(apo, Effect.SPEEDS)
-    form = (
-        "PDEFAULT isn't in the files: as KSS 8.3 and later have it, APO_DIST of 100 mm; older ones "
-        "have 100 %; --set 'PDEFAULT={…}'"
+    for name in ("CPTP", "CDIS", "CORI", "CVEL"):
+        found[f"$APO.{name}"] = Assumption(apo, Effect.SPEEDS)
+    path = (
+        "$VEL or $ACC isn't set whole: what lacks is as BAS(#INITMOV) sets it, 2 m/s, 200 deg/s, "
+        "2.3 m/s^2, 100 deg/s^2"
     )
+    for name in ("$VEL.CP", "$VEL.ORI1", "$ACC.CP", "$ACC.ORI1"):
+        found[name] = Assumption(path, Effect.SPEEDS)
+    axis = "$VEL_AXIS or $ACC_AXIS isn't set for every axis: what lacks is 100 %"
+    for n in range(1, AXES + 1):
+        found[f"$VEL_AXIS[{n}]"] = Assumption(axis, Effect.SPEEDS)
+        found[f"$ACC_AXIS[{n}]"] = Assumption(axis, Effect.SPEEDS)
+    for name, unit in DELIVERED.items():
+        said = f"{name} {DEFAULTS[name]:g} {unit}"
+        found[name] = Assumption(said, Effect.SPEEDS, delivered=name)
+    form = f"PDEFAULT isn't in the files: APO_DIST of {forms.value}; --set 'PDEFAULT={{…}}'"
     found["PDEFAULT"] = Assumption(form, Effect.SPEEDS)
     found["$TOOL"] = Assumption("no $TOOL is chosen: the cell's tool", Effect.PLACES)
     found["$BASE"] = Assumption("no $BASE is chosen: the robot's foot", Effect.PLACES)
