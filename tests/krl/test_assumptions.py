@@ -88,8 +88,8 @@ ASSUMED = {
     "home": ("PTP XHOME", "XHOME isn't in the files: the cell's home", Effect.PLACES),
     "the data of the home form": (
         "PDAT_ACT=PDEFAULT\nFDAT_ACT=FHOME\nBAS(#PTP_PARAMS,100)\nPTP XHOME C_DIS",
-        "PDEFAULT isn't in the files: as KSS 8.3 and later have it, APO_DIST of 100 mm; older ones "
-        "have 100 %; --set 'PDEFAULT={…}'",
+        "PDEFAULT isn't in the files: APO_DIST of 100 mm, as from KSS 8.3 on; older ones have "
+        "100 %; --set 'PDEFAULT={…}'",
         Effect.SPEEDS,
     ),
     "an external axis": (
@@ -179,6 +179,40 @@ ASSUMED = {
         "$TIMER[2] stands still: no time passes for a timer",
         Effect.MOTIONS,
     ),
+    "figures of $config.dat": (
+        "BAS(#INITMOV,0)\nPTP {A1 1}\nLIN_REL {X 1} C_DIS\nLIN_REL {X 1}",
+        "of $config.dat, not in the files, as delivered: DEF_VEL_PTP 100 %, DEF_APO_CDIS 3 mm, "
+        "DEF_VEL_CP 2 m/s, DEF_VEL_ORI1 200 deg/s, DEF_ACC_CP 2.3 m/s^2, DEF_ACC_ORI1 100 deg/s^2; "
+        "--set 'NAME=…'",
+        Effect.SPEEDS,
+    ),
+    "figures of $config.dat in forms of the spline kind": (
+        "SLIN_REL {X 1} WITH $VEL_AXIS[1]=SVEL_JOINT(9), $VEL=SVEL_CP(1.0), $ACC=SACC_CP({ACC 50})",
+        "of $config.dat, not in the files, as delivered: DEF_VEL_ORIS 200 deg/s, "
+        "DEF_ACC_CP 2.3 m/s^2, DEF_ACC_ORIS 200 deg/s^2; --set 'NAME=…'",
+        Effect.SPEEDS,
+    ),
+    "the speed of a path": (
+        "$VEL.CP=0.5\nLIN_REL {X 1}",
+        "$VEL or $ACC isn't set whole: what lacks is as BAS(#INITMOV) sets it, 2 m/s, 200 deg/s, "
+        "2.3 m/s^2, 100 deg/s^2",
+        Effect.SPEEDS,
+    ),
+    "the speed of an axis": (
+        "$VEL_AXIS[1]=50\nPTP {A1 1}",
+        "$VEL_AXIS or $ACC_AXIS isn't set for every axis: what lacks is 100 %",
+        Effect.SPEEDS,
+    ),
+    "where the motion before began": (
+        "PTP {A1 1}\nPTP $AXIS_BACK",
+        "$AXIS_BACK is known on the controller only: taken as where the robot stands",
+        Effect.PLACES,
+    ),
+    "how a circle turns the tool": (
+        "SCIRC {X 1,Y 1},{X 2} WITH $CIRC_MODE={TARGET_PT {ORI #INTERPOLATE}}",
+        "$CIRC_MODE isn't modelled",
+        Effect.PLACES,
+    ),
     "a halt": ("HALT", "HALT waits for the operator: taken as no pause", Effect.TIMES),
 }
 
@@ -217,7 +251,7 @@ LEADS_TO_TEN = {
 def test_what_follows_from_the_program_is_no_assumption(name: str, followed: Follow) -> None:
     program = followed(LEADS_TO_TEN[name])
     assert angles(program) == [10.0]
-    assert texts(program) == []
+    assert not [note for note in program.notes if note.effect is Effect.MOTIONS]
 
 
 @pytest.mark.parametrize("begun", [-300, 0, 200])
@@ -253,11 +287,36 @@ def test_nothing_is_assumed_of_what_a_program_brings(followed: Follow) -> None:
         "XHOME={A1 0,A2 -90,A3 90,A4 0,A5 0,A6 0}\nTOOL_DATA[1]={X 0,Y 0,Z 10,A 0,B 0,C 0}\n"
         "BASE_DATA[2]={X 5,Y 0,Z 0,A 0,B 0,C 0}\nLOAD_DATA[1]={M 9.0}\n$OUT[3]=FALSE\n"
         "READY=TRUE\n$MODE_OP=#EX\n"
+        "DEF_VEL_PTP=100\nDEF_VEL_CP=1.0\n"
         "BAS(#INITMOV,0)\nPTP XHOME\nFDAT_ACT={TOOL_NO 1,BASE_NO 2}\nBAS(#FRAMES)\n"
         "IF READY AND NOT $OUT[3] AND ($MODE_OP==#EX) AND $EXT THEN\n"
         "PTP {X 1,Y 2,Z 3,A 0,B 90,C 0}\nENDIF"
     )
     assert texts(followed(lines)) == []
+
+
+@pytest.mark.parametrize(
+    ("stamps", "mm", "said"),
+    [
+        ("%R 5.4.27,%MKUKATPBASIS", False, "100 %, as before KSS 8.3, whose"),
+        ("%V3.2.0,%MKUKATPBASIS", False, "100 %, as before KSS 8.3, whose"),
+        ("%R 8.3.38,%MKUKATPBASIS", True, "100 mm, as from KSS 8.3 on, whose"),
+        ("%R 5.4.27,%MKUKATPBASIS %R 8.6.1,%MKUKATPBASIS", True, "100 mm, as from KSS 8.3 on;"),
+    ],
+)
+def test_the_home_form_is_that_of_the_version_that_wrote_the_forms(
+    stamps: str, mm: bool, said: str, followed: Follow
+) -> None:
+    lines = (
+        f";FOLD PTP HOME Vel=100 % DEFAULT;%{{PE}}{stamps},%CMOVE,%VPTP\n"
+        "PDAT_ACT=PDEFAULT\nFDAT_ACT=FHOME\nBAS(#PTP_PARAMS,100)\nPTP XHOME C_DIS\n;ENDFOLD"
+    )
+    program = followed(f"BAS(#INITMOV,0)\n{lines}")
+    (motion,) = program.commands
+    assert isinstance(motion, Motion)
+    assert motion.blend is not None
+    assert motion.blend.distance == pytest.approx(0.1 if mm else 3e-3)
+    assert any(f"APO_DIST of {said}" in text for text in texts(program))
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from ir_krl import (
+    Effect,
     Followed,
     KrlError,
     KrlRunError,
@@ -133,6 +134,7 @@ REFUSED = {
     "an output beyond the last": ("PULSE($OUT[9000],TRUE,0.5)", None, "$OUT[9000]: outputs have"),
     "a wait without end": ("WAIT SEC 1E30", "1:1", "a wait is read up to 604800 s, a week"),
     "an output that isn't a truth value": ("$OUT[1]=5", "1:1", "$OUT[1] is set to the number 5"),
+    "a frame with axis angles": ("PTP {A1 0,X 5}", "1:5", "axis angles or a frame, not both"),
     "a motion to a number": ("PTP 5", "1:5", "a motion can't go to the number 5"),
     "LIN to axis angles": ("LIN {A1 0}", "1:1", "LIN goes to a frame"),
     "a speed of nothing": ("$VEL.CP=0\nLIN {X 1}", "2:1", "$VEL.CP is 0; it must be above 0"),
@@ -351,7 +353,16 @@ def test_what_a_spline_does_meanwhile_is_noted(followed: Follow) -> None:
     assert isinstance(block, SplineBlock)
     assert len(block.parts) == 3
     said = {note.text.split(" ")[0] for note in program.notes}
-    assert said == {"TOOL_DATA[1]", "CONST_VEL", "STOP"}
+    assert said == {"TOOL_DATA[1]", "CONST_VEL", "STOP", "of"}
+
+
+@pytest.mark.parametrize("motion", ["CIRC_REL", "SCIRC_REL"])
+def test_a_relative_circle_may_be_one_of_the_tool(motion: str, followed: Follow) -> None:
+    (circle,) = followed(f"{motion} {{Y 5,Z 5}},{{Y 10}},CA 90 #TOOL").commands
+    assert isinstance(circle, Motion)
+    assert circle.via is not None
+    assert circle.target.in_tool
+    assert circle.via.in_tool
 
 
 def test_triggers_of_a_spline_switch_around_it(followed: Follow) -> None:
@@ -372,15 +383,17 @@ def test_triggers_of_a_spline_switch_around_it(followed: Follow) -> None:
 
 
 def test_an_external_axis_that_stands_is_noted(followed: Follow) -> None:
-    assert followed("PTP {A1 0,E1 0.0,E2 0.0}\nPTP {A1 5}").notes == ()
-    (note,) = followed("PTP {A1 0,E1 500}").notes
+    stands = followed("PTP {A1 0,E1 0.0,E2 0.0}\nPTP {A1 5}").notes
+    assert not [note for note in stands if note.effect is Effect.PLACES]
+    program = followed("PTP {A1 0,E1 500}")
+    (note,) = (note for note in program.notes if note.effect is Effect.PLACES)
     assert note.text == "E1 stays at 500: external axes are taken as part of the cell"
 
 
 def test_an_endless_loop_is_followed_once_and_says_so(followed: Follow) -> None:
     program = followed("LOOP\nPTP {A1 1}\nENDLOOP")
     assert len(program.commands) == 1
-    assert [note.text for note in program.notes] == [
+    assert [note.text for note in program.notes if note.effect is Effect.MOTIONS] == [
         "LOOP: nothing that is known ends it, followed once (--loop-passes)"
     ]
     assert len(followed("LOOP\nPTP {A1 1}\nENDLOOP", loop_passes=3).commands) == 3

@@ -170,6 +170,16 @@ def test_a_path_leads_over_a_rounded_corner(planner: Planner, followed: Follow) 
     assert float(np.interp(instants[1], times, lengths)) == pytest.approx(0.06, abs=NEAR)
 
 
+def test_a_pulse_that_is_set_again_begins_anew(planner: Planner, followed: Follow) -> None:
+    """Its first end came nevertheless, in the middle of the second."""
+    program = followed(
+        f"{HEAD}PULSE($OUT[6],TRUE,1.0)\nWAIT SEC 0.5\nPULSE($OUT[6],TRUE,1.0)\nWAIT SEC 2\n"
+        "PULSE($OUT[6],TRUE,1.0)\n$OUT[6]=TRUE\nWAIT SEC 2"
+    )
+    found = [(value, round(at, 2)) for _, value, at in switched(planner, program)]
+    assert found == [(True, 0.0), (True, 0.5), (False, 1.5), (True, 2.5), (True, 2.5)]
+
+
 def test_what_a_trigger_calls_goes_on_beside_the_motion(planner: Planner, followed: Follow) -> None:
     """Its waits delay what it sets, over the end of the motion into the next and into a wait."""
     program = followed(

@@ -98,9 +98,7 @@ class Assigning(Control):
             self.memory.set_beside(name)
         if index is not None:
             self._follow_clock(name, index[0], value)
-        assumed = self.memory.chosen.pop(name, None)
-        if assumed is not None:  # of STOOL2, SBASE
-            self.memory.assumed[name] = assumed
+        self.memory.take_chosen(name)  # of STOOL2, SBASE, SVEL_CP
         for other, follows in mode_variables(name, value).items():
             self.memory.set(((other, None),), follows, where)
 
@@ -209,6 +207,7 @@ _MOVING = (
     "$EX_KIN",
     "$JOINT_OFFSET",
     "$PAL_MODE",
+    "$CIRC_MODE",
 )
 """Beginnings of the names of system variables that change where a motion leads."""
 
@@ -249,7 +248,7 @@ class Motions:
             for child in tree.children
             if isinstance(child, Tree) and child.data not in _OTHERS
         ]
-        in_tool = relative and kind != "circ" and str(tree.children[-1]) == "#TOOL"
+        in_tool = relative and str(tree.children[-1]) == "#TOOL"
         if kind == "circ":
             via = self.target(frames[0], relative, in_tool)
             end = self.target(frames[1], relative, in_tool)
@@ -279,7 +278,7 @@ class Motions:
         return Motion(
             kind,
             end,
-            self.speeds(place, spline=spline, axis=kind == "ptp" or spline),
+            self.speeds(place, spline=spline, axis=kind == "ptp" or spline, path=kind != "ptp"),
             place,
             blend,
             via,
@@ -332,6 +331,10 @@ class Motions:
         unknown = next((name for name in value.fields if name not in _COMPONENTS), None)
         if unknown is not None:
             raise KrlRunError(f"{unknown} is no component of a position", place)
+        along = next((name for name in value.fields if name in FRAME_NAMES), None)
+        if along is not None and is_axis_value(value):
+            text = f"a position has axis angles or a frame, not both: leave out {along} or A1 to A6"
+            raise KrlRunError(text, place)
         for name, at in components(value, EXTERNAL_NAMES, place).items():
             before = self._external.get(name, 0.0 if relative else at)
             now = before + at if relative else at
@@ -348,7 +351,12 @@ class Motions:
                 self._noted(place, text, Effect.PLACES)
 
     def here(self, name: str, place: Place) -> Target:
-        """Where the robot stands: PTP $AXIS_ACT, as programs begin."""
+        """Where the robot stands: PTP $AXIS_ACT, as programs begin; what stands for another place
+        of the path is taken as that, which is said.
+        """
+        if name.endswith(("_RET", "_BACK", "_FOR")):
+            text = f"{name} is known on the controller only: taken as where the robot stands"
+            self._noted(place, text, Effect.PLACES)
         if name.startswith("$AXIS"):
             axis: dict[str, float] | None = {"A1": 0.0}
             frame = None
@@ -368,11 +376,15 @@ class Motions:
         base, tool = (pose(Structure({}) if one is None else one, n, place) for n, one in found)
         return base, tool
 
-    def speeds(self, place: Place, *, spline: bool, axis: bool) -> Speeds:
+    def speeds(self, place: Place, *, spline: bool, axis: bool, path: bool) -> Speeds:
         """How fast the system variables say, of a motion of the `spline` kind or of the other;
         each bounded by what a controller takes. axis: $VEL_AXIS and $ACC_AXIS count, as they don't
-        for LIN and CIRC.
+        for LIN and CIRC; path: $VEL and $ACC count, as they don't for PTP.
         """
+        if path:  # says what is assumed of them
+            for variable in ("$VEL", "$ACC"):
+                for component in ("CP", "ORI1"):
+                    self._memory.get(((variable, None), (component, None)), place)
         velocity, acceleration = (
             tuple(self._share(name, (j,), place) if axis else 1.0 for j in range(1, AXES + 1))
             for name in ("$VEL_AXIS", "$ACC_AXIS")
@@ -460,7 +472,10 @@ class Motions:
         return number(value, f"{variable}.{component}", place)
 
     def _positive(self, variable: str, component: str, place: Place) -> float:
-        value = self._number(variable, component, place)
+        held = self._memory.peek(variable)
+        fields = held.fields if isinstance(held, Structure) else {}
+        written = f"{variable}.{component}"
+        value = number(fields.get(component, Unknown(written)), written, place)
         if value <= 0.0:
             raise KrlRunError(f"{variable}.{component} is {value:g}; it must be above 0", place)
         most = self._memory.peek(f"{variable}_MA")

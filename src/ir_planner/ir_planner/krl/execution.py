@@ -162,12 +162,18 @@ def _triggered(commands: Sequence[Command]) -> dict[int, list[SetOutput]]:
 
 
 class _Event(NamedTuple):
-    """What happens in a step, `at` s after it began: an output is set, or the next motion says what
-    it carries.
+    """What happens in a step, `at` s after it began: an output is set, by the end of a pulse
+    (`ends_pulse`) or else, or the next motion says what it carries.
     """
 
     at: float
     change: SetOutput | Motion
+    ends_pulse: bool = False
+
+    def pulses(self, number: int) -> bool:
+        """Whether a pulse of this output ends."""
+        change = self.change
+        return self.ends_pulse and isinstance(change, SetOutput) and change.number == number
 
 
 @dataclass
@@ -348,12 +354,13 @@ class _Drive:
         self._goes_back(command, 0.0)
 
     def _goes_back(self, command: SetOutput, at: float) -> None:
-        """A pulse that is set at `at` s ends by itself. A gripper's stays: its valve keeps its
-        side.
+        """A pulse that is set at `at` s ends by itself, unless its output is set again before. A
+        gripper's stays: its valve keeps its side.
         """
+        self._later = [one for one in self._later if not one.pulses(command.number)]
         if command.pulse > 0.0 and not self.around.grips(command.number):
             back = replace(command, value=not command.value, pulse=0.0)
-            insort(self._later, _Event(at + command.pulse, back), key=_at)
+            insort(self._later, _Event(at + command.pulse, back, ends_pulse=True), key=_at)
 
     def _motion(self, motion: Motion, triggered: Sequence[SetOutput]) -> None:
         if not self._through:
