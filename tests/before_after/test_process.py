@@ -143,7 +143,7 @@ def test_what_is_taken_for_positioning_is_said_and_can_be_named(found: Evaluated
 
 
 def test_corners_that_become_exact_are_said(planner: Planner, found: EvaluatedProgram) -> None:
-    assert not any("corners" in note for note in today_of_krl(found).notes)
+    assert not any("corners are" in note for note in today_of_krl(found).notes)
     mixed = SEAM.replace("LIN_REL {X 60} C_DIS", "LIN_REL {X 60}")
     notes = today_of_krl(evaluated(planner, mixed)).notes
     assert sum("corners are approximated by 0 to 10 mm today" in note for note in notes) == 1

@@ -198,6 +198,11 @@ ASSUMED = {
         "2.3 m/s^2, 100 deg/s^2",
         Effect.SPEEDS,
     ),
+    "how fast the tool turns about its own axis": (
+        "BAS(#INITMOV,0)\n$VEL.ORI2=1\nLIN_REL {A 10}",
+        "$VEL.ORI2 isn't $VEL.ORI1: the tool turns by ORI1 all ways",
+        Effect.SPEEDS,
+    ),
     "the speed of an axis": (
         "$VEL_AXIS[1]=50\nPTP {A1 1}",
         "$VEL_AXIS or $ACC_AXIS isn't set for every axis: what lacks is 100 %",

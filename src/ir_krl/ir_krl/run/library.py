@@ -345,7 +345,7 @@ class Library:
         self._set("$VEL_AXIS", min(share, FULL))
         speed = number(_first(arguments, "SVEL_CP", place), "SVEL_CP", place)
         turning = self._default("DEF_VEL_ORIS", "$VEL.ORI1")
-        return Structure({"CP": min(speed, self._fastest(speed)), "ORI1": turning})
+        return _turning_too(min(speed, self._fastest(speed)), turning)
 
     def _path_acceleration(self, arguments: Arguments, place: Place) -> Value:
         own = _component(arguments, "ACC", place)
@@ -354,7 +354,7 @@ class Library:
         share = percent / FULL
         turning = self._default("DEF_ACC_ORIS", "$ACC.ORI1") * share
         along = self._default("DEF_ACC_CP", "$ACC.CP") * share
-        return Structure({"CP": along, "ORI1": turning})
+        return _turning_too(along, turning)
 
     def _axis_approximation(self, arguments: Arguments, place: Place) -> Value:
         """SAPO_PTP: millimetres, and a share of the motion where APO_MODE is #CPTP."""
@@ -374,6 +374,11 @@ class Library:
             text = f"LOAD_DATA[{index}] isn't in the files: what the cell holds"
             self._memory.noted(place, text, Effect.TIMES)
         return Structure({"M": -1.0}, "LOAD")
+
+
+def _turning_too(along: float, turning: float) -> Structure:
+    """What $VEL or $ACC is: of the path, and of the tool's turning, all ways."""
+    return Structure({"CP": along, "ORI1": turning, "ORI2": turning})
 
 
 def _given(value: Value | None, what: str, place: Place) -> Value:

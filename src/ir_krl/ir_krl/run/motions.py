@@ -385,6 +385,11 @@ class Motions:
             for variable in ("$VEL", "$ACC"):
                 for component in ("CP", "ORI1"):
                     self._memory.get(((variable, None), (component, None)), place)
+                held = self._memory.peek(variable)
+                fields = held.fields if isinstance(held, Structure) else {}
+                if fields.get("ORI2", fields.get("ORI1")) != fields.get("ORI1"):
+                    text = f"{variable}.ORI2 isn't {variable}.ORI1: the tool turns by ORI1 all ways"
+                    self._noted(place, text, Effect.SPEEDS)
         velocity, acceleration = (
             tuple(self._share(name, (j,), place) if axis else 1.0 for j in range(1, AXES + 1))
             for name in ("$VEL_AXIS", "$ACC_AXIS")
