@@ -72,6 +72,7 @@ from ir_planner.request import (
     noted,
     one_tilt,
     parse_goal,
+    tool_bounds_of,
     upright_options,
     within_limits,
 )
@@ -322,7 +323,7 @@ class Planner:
         start = trajectory.reordered(scene.cell.robot.joint_names).positions[0]
         options = upright_options(options, scene, start)
         cone = cone_of(options, scene)
-        tool = Context.of(scene, options, self._work(options, _NEVER), station).tool_bounds
+        tool = tool_bounds_of(options, scene, station)
         found = evaluate_trajectory(
             trajectory, scene, safety_distance, station, cone=cone, tool=tool
         )

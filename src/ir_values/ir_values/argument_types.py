@@ -186,13 +186,19 @@ class _Arguments:
             if one.kind in (one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD)
         ]
 
+    @cached_property
+    def of_self(self) -> int:
+        """How many of the first ones have no annotation: a call with no others isn't looked at."""
+        annotated = (k for k, one in enumerate(self._in_order) if one is not None)
+        return next(annotated, len(self._in_order))
+
     def taken(
         self, args: Sequence[Any], named: Mapping[str, Any], refusal: Refusal
     ) -> tuple[list[Any], dict[str, Any]]:
         """The arguments as they are handed on; raises `refusal` of the first that doesn't fit."""
         by_place = list(args)
-        for k, argument in enumerate(self._in_order[: len(by_place)]):
-            by_place[k] = _taken(argument, by_place[k], refusal)
+        for k, (argument, value) in enumerate(zip(self._in_order, args, strict=False)):
+            by_place[k] = _taken(argument, value, refusal)
         by_name = {
             name: _taken(self._by_name.get(name), value, refusal) for name, value in named.items()
         }
@@ -219,6 +225,8 @@ def typed(refusal: Refusal) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
         @wraps(call)
         def checked(*args: P.args, **named: P.kwargs) -> R:
+            if not named and len(args) <= arguments.of_self:
+                return call(*args, **named)
             by_place, by_name = arguments.taken(args, named, refusal)
             return call(*by_place, **by_name)
 

@@ -71,19 +71,22 @@ def tool_derivatives(
             np.maximum(np.abs(fourth), np.abs(last)),
         )
     )
-
-    def outermost(sums: FloatArray) -> FloatArray:
-        """Sums (S,) of terms times the distance from their outermost axes, from those up to each
-        axis.
-        """
-        return np.asarray(portable.matmul(np.diff(sums, axis=1, prepend=0.0), reach))
-
     square = v * v
+    sums = np.stack(
+        [
+            a + square,
+            j + 3.0 * a * v + square * v,
+            s + 4.0 * j * v + 3.0 * a * a + 6.0 * a * square + square * square,
+        ]
+    )
+    outermost = sums.copy()  # of the terms whose outermost axis is each one
+    outermost[:, :, 1:] -= sums[:, :, :-1]
+    acceleration, jerk, snap = portable.matmul(outermost, reach)
     return ToolDerivatives(
         trajectory.times,
-        outermost(a + square),
-        outermost(j + 3.0 * a * v + square * v),
-        outermost(s + 4.0 * j * v + 3.0 * a * a + 6.0 * a * square + square * square),
+        acceleration,
+        jerk,
+        snap,
         np.asarray(a[:, -1] + v[:, -1] ** 2),
         np.asarray(j[:, -1] + 3.0 * a[:, -1] * v[:, -1] + portable.power(v[:, -1], 3)),
     )
@@ -102,9 +105,11 @@ def _reach(scene: PlanningScene, end: float) -> FloatArray:
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    return np.stack(
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    )
+    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    np.subtract(a[1] * b[2], a[2] * b[1], out=product[0])
+    np.subtract(a[2] * b[0], a[0] * b[2], out=product[1])
+    np.subtract(a[0] * b[1], a[1] * b[0], out=product[2])
+    return product
 
 
 def _length(a: FloatArray) -> FloatArray:
@@ -112,43 +117,53 @@ def _length(a: FloatArray) -> FloatArray:
 
 
 def _turned(rotation: FloatArray, vector: FloatArray) -> FloatArray:
-    """A vector (3,) of links with rotations (N, 3, 3), (3, N) in the world."""
+    """Vectors (3, K, 1) of links with rotations (3, 3, K, N), (3, K, N) in the world."""
     x, y, z = vector
-    return np.asarray((rotation[:, :, 0] * x + rotation[:, :, 1] * y + rotation[:, :, 2] * z).T)
+    return np.asarray(rotation[:, 0] * x + rotation[:, 1] * y + rotation[:, 2] * z)
+
+
+def _after(*terms: FloatArray) -> FloatArray:
+    """Sums (3, K, N) of terms (3, K, N) up to each axis, those of an axis in this order."""
+    sums = np.empty_like(terms[0])
+    total = np.zeros_like(terms[0][:, 0])
+    for k in range(sums.shape[1]):
+        for term in terms:
+            total += term[:, k]
+        sums[:, k] = total
+    return sums
 
 
 def tool_states(
-    scene: PlanningScene, q: FloatArray, qd: FloatArray, qdd: FloatArray
+    scene: PlanningScene, q: FloatArray, qd: FloatArray, qdd: FloatArray, points: slice
 ) -> tuple[FloatArray, FloatArray]:
-    """Largest speed [m/s] and acceleration [m/s^2] (N, P) of the spheres around the points of the
-    tool, at states (N, n): those of the centre, and what turning adds on its surface at most.
+    """Largest speed [m/s] and acceleration [m/s^2] (N,) of the spheres around points of the tool,
+    at states (N, n): those of the centre, and what turning adds on its surface at most.
     """
-    chain = scene.chain
-    poses = chain.link_poses(q)
-    count = len(q)
-    turn, change, speed, gain = np.zeros((4, 3, count))  # of the frame after an axis, at its origin
-    for k in range(chain.n):
-        if k > 0:
-            arm = (poses[:, k + 1, :3, 3] - poses[:, k, :3, 3]).T
-            lift = _cross(turn, arm)
-            speed = speed + lift
-            gain = gain + _cross(change, arm) + _cross(turn, lift)
-        axis = _turned(poses[:, k + 1, :3, :3], chain.joint_axis[k])
-        rate = axis * qd[:, k]
-        change = change + axis * qdd[:, k] + _cross(turn, rate)
-        turn = turn + rate
-    points, radii = scene.tool_points
-    speeds, accelerations = np.empty((2, count, len(points)))
+    states = (2, 3, 1, 0)  # last, where arrays of states are fast
+    poses = np.ascontiguousarray(scene.chain.link_poses(q)[:, :, :3].transpose(states))
+    rotation = poses[:, :3, 1:]
+    places = poses[:, 3, 1:]
+    axis = _turned(rotation, scene.chain.joint_axis.T[:, :, None])
+    rate = axis * np.ascontiguousarray(qd.T)
+    turn = _after(rate)  # of the frame after each axis, (3, n, N)
+    before = np.zeros_like(turn)
+    before[:, 1:] = turn[:, :-1]
+    change = _after(axis * np.ascontiguousarray(qdd.T), _cross(before, rate))
+    arm = places[:, 1:] - places[:, :-1]
+    lift = _cross(turn[:, :-1], arm)
+    speed = _after(lift)[:, -1:]  # at the origin of the last one
+    gain = _after(_cross(change[:, :-1], arm), _cross(turn[:, :-1], lift))[:, -1:]
+    turn = turn[:, -1:]
+    change = change[:, -1:]
     swing = _length(turn)
     twist = _length(change) + swing * swing
-    for p, (point, radius) in enumerate(zip(points, radii, strict=True)):
-        arm = _turned(poses[:, -1, :3, :3], point)
-        lift = _cross(turn, arm)
-        speeds[:, p] = _length(speed + lift) + radius * swing
-        accelerations[:, p] = (
-            _length(gain + _cross(change, arm) + _cross(turn, lift)) + radius * twist
-        )
-    return speeds, accelerations
+    centres, radii = scene.tool_points
+    size = radii[points, None]
+    arm = _turned(rotation[:, :, -1:], centres[points].T[:, :, None])
+    lift = _cross(turn, arm)
+    speeds = _length(speed + lift) + size * swing
+    bends = _length(gain + _cross(change, arm) + _cross(turn, lift)) + size * twist
+    return speeds.max(axis=0), bends.max(axis=0)
 
 
 def _values(polynomials: FloatArray, t: FloatArray) -> FloatArray:
@@ -165,6 +180,7 @@ _RESOLUTION = 2e-3  # share of the largest value that the bound may add between 
 _FINER = 8  # times as many instants where a bound doesn't decide,
 _ROUNDS = 3
 _MOST = 200_000  # instants of a trajectory at a time
+_AT_ONCE = 800  # of these, whose arrays stay in the processor's cache
 # where nothing is asked and the largest bounds are only reported: a proof of a movement stays fast
 _REPORTED_RESOLUTION = 0.02
 _REPORTED_AT_ONCE = 1_000  # instants that cost less than another round
@@ -354,8 +370,9 @@ class ToolUse:
         q = _values(c, t)
         qd = _values((c * order)[:, :, 1:], t)
         qdd = _values((c * order * (order - 1))[:, :, 2:], t)
-        speeds, accelerations = tool_states(self.scene, q, qd, qdd)
-        return (
-            np.maximum.reduceat(speeds[:, points].max(axis=1), begins),
-            np.maximum.reduceat(accelerations[:, points].max(axis=1), begins),
+        parts = (slice(k, k + _AT_ONCE) for k in range(0, len(q), _AT_ONCE))
+        speeds, accelerations = np.concatenate(
+            [tool_states(self.scene, q[part], qd[part], qdd[part], points) for part in parts],
+            axis=1,
         )
+        return np.maximum.reduceat(speeds, begins), np.maximum.reduceat(accelerations, begins)

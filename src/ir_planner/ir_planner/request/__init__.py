@@ -18,6 +18,7 @@ from ir_planner.request.context import (
     cone_of,
     noted,
     one_tilt,
+    tool_bounds_of,
     upright_options,
 )
 from ir_planner.request.goals import (
@@ -56,6 +57,7 @@ __all__ = [
     "one_tilt",
     "parse_goal",
     "safety_distance",
+    "tool_bounds_of",
     "upright_options",
     "within_limits",
 ]

@@ -176,6 +176,13 @@ def cone_of(options: PlanOptions, scene: PlanningScene) -> ToolCone | None:
     return ToolCone(scene.chain, axis, direction, options.tilt_max)
 
 
+def tool_bounds_of(options: PlanOptions, scene: PlanningScene, station: str = "") -> ToolBounds:
+    """How fast the tool may be: what the request, the loads and the station say."""
+    asked = [ToolLimits(options.tool_speed, options.tool_acceleration, options.whole_tool)]
+    asked += [s.limits for s in scene.cell.stations if s.name == station]
+    return scene.tool_bounds.within(ToolBounds.of(asked))
+
+
 @dataclass(frozen=True, eq=False)
 class Context:
     """scene: where the robot moves. options: as they were checked, with the robot's own price of a
@@ -216,20 +223,17 @@ class Context:
         """Names of the joints, in the robot's order."""
         return self.scene.cell.robot.joint_names
 
-    @property
+    @cached_property
     def limits(self) -> MotionLimits:
         """The robot's bounds times the request's scalings, and those of the tool."""
         options = self.options
         limits = self.scene.limits.scaled(options.velocity_scaling, options.acceleration_scaling)
         return replace(limits, tool=self.tool_bounds)
 
-    @property
+    @cached_property
     def tool_bounds(self) -> ToolBounds:
-        """How fast the tool may be: what the request, the loads and the station say."""
-        options = self.options
-        asked = [ToolLimits(options.tool_speed, options.tool_acceleration, options.whole_tool)]
-        asked += [s.limits for s in self.scene.cell.stations if s.name == self.station]
-        return self.scene.tool_bounds.within(ToolBounds.of(asked))
+        """How fast the tool may be."""
+        return tool_bounds_of(self.options, self.scene, self.station)
 
     @cached_property
     def cone(self) -> ToolCone | None:
