@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ir_kernels import arguments, data, portable
+from ir_kernels import arguments, data
 from ir_kernels.errors import InputError
 from ir_kernels.power import REGENERATIONS, Regeneration
 from ir_values.arrays import FloatArray
@@ -133,7 +133,8 @@ def checked_terms(terms: SplineTerms, n: int, pairs: int) -> SplineTerms:
 def _unit(value: ArrayLike, name: str) -> FloatArray:
     """A direction (3,) of length 1. Raises InputError."""
     direction = data.array(_copy(value), name, (3,))
-    length = float(portable.norm(direction))
+    x, y, z = direction.tolist()
+    length = math.sqrt(x * x + y * y + z * z)
     if abs(length - 1.0) > _UNIT:
         raise InputError(f"{name} has length {length}: expected 1")
     return direction

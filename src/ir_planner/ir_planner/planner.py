@@ -146,7 +146,7 @@ def options_with(options: PlanOptions | None, changes: OptionFields) -> PlanOpti
         if name not in known:
             raise UnknownNameError("option", name, known)
     try:
-        return replace(options or PlanOptions(), **changes)
+        return PlanOptions(**changes) if options is None else replace(options, **changes)
     except InvalidValueError as error:
         raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, str(error)) from error
     except (TypeError, ValueError, OverflowError) as error:

@@ -193,16 +193,20 @@ class _Arguments:
         return next(annotated, len(self._in_order))
 
     def taken(
-        self, args: Sequence[Any], named: Mapping[str, Any], refusal: Refusal
+        self, args: Sequence[Any], named: dict[str, Any], refusal: Refusal
     ) -> tuple[list[Any], dict[str, Any]]:
-        """The arguments as they are handed on; raises `refusal` of the first that doesn't fit."""
+        """The arguments as they are handed on, `named` as the same mapping; raises `refusal` of the
+        first that doesn't fit.
+        """
         by_place = list(args)
         for k, (argument, value) in enumerate(zip(self._in_order, args, strict=False)):
             by_place[k] = _taken(argument, value, refusal)
-        by_name = {
-            name: _taken(self._by_name.get(name), value, refusal) for name, value in named.items()
-        }
-        return by_place, by_name
+        by_name = self._by_name
+        for name, value in named.items():
+            argument = by_name.get(name)
+            if argument is not None and type(value) is not argument.kind:
+                named[name] = _taken(argument, value, refusal)
+        return by_place, named
 
 
 def _taken(argument: _Argument | None, value: Any, refusal: Refusal) -> Any:

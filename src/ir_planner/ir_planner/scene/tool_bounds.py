@@ -67,6 +67,8 @@ class ToolBounds:
 
     def for_speed(self, share: float) -> ToolBounds:
         """What a motion has to keep so that it keeps these at 1 / share times its speed."""
+        if not self.asked:
+            return self
         return ToolBounds(self.tcp.for_speed(share), self.whole.for_speed(share))
 
     def text(self) -> str:
