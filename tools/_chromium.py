@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import base64
 import ctypes
+import io
 import json
+import math
 import os
 import re
 import shutil
@@ -23,6 +25,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from PIL import Image
 from websockets.sync.client import ClientConnection, connect
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
@@ -39,6 +42,7 @@ FLAGS = (
     ),
 )
 START_SECONDS = 60.0
+_PIECE = 4000  # pixels: of a picture of a whole page, what is drawn at once
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 ANSWER_SECONDS = 60.0  # a busy machine draws 3D in software
 
@@ -244,9 +248,35 @@ class Page:
     def picture(self, path: Path, *, whole: bool = True) -> Path:
         """Writes a PNG of the page, or of the window alone."""
         self.frame()
-        answer = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)
+        if whole:
+            self._joined().save(path)
+            return path
+        answer = self.call("Page.captureScreenshot", format="png")
         path.write_bytes(base64.b64decode(answer["data"]))
         return path
+
+    def _joined(self) -> Image.Image:
+        """The whole page, of pieces below each other: Chromium repeats the top of one that is
+        higher than a texture, 8192 pixels.
+        """
+        size = self.call("Page.getLayoutMetrics")["cssContentSize"]
+        wide = math.ceil(size["width"])
+        high = math.ceil(size["height"])
+        whole = Image.new("RGB", (wide, high))
+        for top in range(0, high, _PIECE):
+            clip = {
+                "x": 0,
+                "y": top,
+                "width": wide,
+                "height": min(_PIECE, high - top),
+                "scale": 1.0 / self.run("window.devicePixelRatio"),
+            }
+            answer = self.call(
+                "Page.captureScreenshot", format="png", captureBeyondViewport=True, clip=clip
+            )
+            piece = Image.open(io.BytesIO(base64.b64decode(answer["data"])))
+            whole.paste(piece, (0, top))
+        return whole
 
     def downloads(self, folder: Path) -> None:
         """Files that the page offers go into a folder without asking."""
