@@ -47,6 +47,13 @@ def test_the_nearest_pair_is_that_of_the_cell_as_it_stands(cell: Cell, heard: He
         assert " – " in str(pair)
 
 
+def test_in_a_pause_no_pair_is_the_nearest_as_in_a_report(heard: Heard) -> None:
+    view = CellView()
+    for kind, said in (("pause", False), ("regional", True)):
+        near = view.look(replace(heard, movement=PlannedMovement(kind=kind)))["near"]
+        assert (near is not None) is said
+
+
 def test_joints_in_another_order_are_put_right_and_strangers_show_nothing(heard: Heard) -> None:
     view = CellView()
     q = np.radians([10.0, -80.0, 85.0, 5.0, 30.0, -20.0])

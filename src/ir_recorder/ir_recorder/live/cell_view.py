@@ -170,11 +170,12 @@ class CellView:
 
     def _near(self, heard: Heard) -> Json:
         """Distance [m], the two points and the names of the nearest pair that isn't allowed to
-        touch.
+        touch; None in a pause, as in a report: what stands at a station may touch it.
         """
         cell = self._cell
         q = self.in_order(heard.joints, heard.q)
-        if cell is None or q is None:
+        pausing = heard.movement is not None and heard.movement.is_pause
+        if cell is None or q is None or pausing:
             return None
         key = (self._version, heard.load, tuple(sorted(self._places.lying.items())))
         if self._model is None or self._model[0] != key:

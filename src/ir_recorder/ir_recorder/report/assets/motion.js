@@ -186,6 +186,7 @@ class Motion {
     if (this.show.zones) this.drawZones();
     r.end();
     this.placeLabels(view, box);
+    this.canvas.parentElement.style.setProperty("--aspect", width / height); /* paper keeps the picture's shape */
   }
   /* The machines' names, above the middle of each. */
   machineLabels() {
@@ -209,8 +210,8 @@ class Motion {
       const hit = () => placed.find(([l, t, half, h]) => Math.abs(l - left) < half + wide && top > t - h && t > top - high);
       for (let k = 0; k < 3 && hit(); k++) top = hit()[1] - hit()[3];
       element.hidden = Boolean(hit()) || top < high;
-      element.style.left = `${left}px`;
-      element.style.top = `${top}px`;
+      element.style.left = `${100 * left / box.width}%`;
+      element.style.top = `${100 * top / box.height}%`;
       if (!element.hidden) placed.push([left, top, wide, high]);
     }
   }
