@@ -62,6 +62,8 @@ def test_energies_of_hops_and_of_the_power_are_those_of_the_programs(compared: B
         assert sum(hop.energy for hop in side.hops) == pytest.approx(side.report.energy)
         step = side.report.duration / len(side.time)
         assert float(side.watts.sum()) * step == pytest.approx(side.report.energy, rel=1e-9)
+        assert (side.high >= side.watts).all()
+        assert side.high.max() == pytest.approx(side.report.peak_power, rel=1e-9)
 
 
 def test_a_saving_is_known_better_than_the_energies_that_it_is_the_difference_of(

@@ -55,6 +55,10 @@ def test_the_page_has_both_motions_and_all_figures(compared: BeforeAfter, planne
     assert angles[row] == pytest.approx(
         first.sample(np.array([row * today["step"]])).q[0], abs=2e-4
     )
+    (curves,) = data["axes"]
+    high = np.frombuffer(base64.b64decode(curves["high"]), "<i2").reshape(-1, 4) * curves["step"]
+    peaks = [side.report.peak_power for side in (compared.today, *compared.sides)]
+    assert high.max(axis=0) == pytest.approx(peaks, rel=1e-3)
     for words in ("saved a year", "CO2", "peak power", "pause at point_2", "0.2 EUR/kWh"):
         assert words in page
 

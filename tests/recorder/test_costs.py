@@ -280,5 +280,18 @@ def test_hibernation_outside_of_the_shifts_is_a_headline(analysis: Analysis) -> 
     assert member is not None
     assert words in clock_section(analysis, costs)
     assert words in fleet_html([member], costs=costs)
-    assert "outside of shifts, saved a year" in report_html(analysis, (), costs=costs)
+    rows = [
+        page.split('<section class="tiles">')[1].replace(", predicted", "")
+        for page in (report_html(analysis, (), costs=costs), fleet_html([member], costs=costs))
+    ]
+    names = ("saved a year in shifts, by the plan", "saved a year at night and at weekends")
+    for name in (*names, "saved a year, both together", "less energy of the whole line"):
+        first, second = (row.split(f"<span>{name}</span>")[1].split("</b>")[0] for row in rows)
+        assert first == second, name
+    cycle = production_of(analysis)
+    assert cycle is not None
+    year = costs.saving_of_year(cycle)
+    assert year is not None
+    both = yearly_money(costs.money(year.value) + found.saved, "EUR")
+    assert f"<span>saved a year, both together</span><b>{both}</b>" in rows[0]
     assert idle_saving({}, costs) is None

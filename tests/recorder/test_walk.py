@@ -25,7 +25,8 @@ from ir_msgs.msg import PlannedMovement
 from ir_msgs_py.modes import Mode
 from ir_recorder import Analysis, analyse, findings, read_recording
 from ir_recorder.analysis.production import Production, demand_watts, levers, production_of
-from ir_recorder.report import report_html
+from ir_recorder.analysis.tending import Span
+from ir_recorder.report import report_html, robots
 from ir_recorder.report.compare import comparison_html
 from ir_recorder.report.costs import Costs
 from ir_recorder.report.fleet import fleet_columns, fleet_html, member_of
@@ -258,3 +259,17 @@ def test_the_terminal_says_what_the_pages_show(walked: Analysis) -> None:
         joules, (walked.savings.total.planned, walked.savings.total.common), strict=True
     ):
         assert figure.shows(exact), total
+
+
+@pytest.mark.parametrize("late", [0.0, 1.0])
+def test_robots_that_are_in_a_zone_together_are_marked(
+    walked: Analysis, monkeypatch: pytest.MonkeyPatch, late: float
+) -> None:
+    start = walked.steps[0].step.start
+    passes = {"left": [Span(start, start + 1.0 + late)], "right": [Span(start + 1.0, start + 3.0)]}
+    monkeypatch.setattr(robots, "zone_passes", lambda _: {"zone_1": passes})
+    page = robots_html({"left": walked, "right": walked}, ())
+    chart = page.split('<svg class="gantt" id="robots"')[1]
+    assert ('class="late"' in chart) == (late > 0.0)
+    if late:
+        assert "left and right together, 1.00 s" in chart

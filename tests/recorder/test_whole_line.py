@@ -70,7 +70,7 @@ def test_report_and_fleet_say_the_same(analysis: Analysis) -> None:
     pages = (report_html(analysis, findings(analysis)), fleet_html([member]))
     assert all("Of the whole line" in page and shown in page for page in pages)
     several = comparison_html([(analysis, findings(analysis)), (analysis, findings(analysis))])
-    row = several.partition("of the whole line")[2].partition("</tr>")[0]
+    row = several.partition("energy of the whole line")[2].partition("</tr>")[0]
     assert row.count(shown) == 2
     assert row.count(f"{found.factory.value:.1f} %") == 2
 

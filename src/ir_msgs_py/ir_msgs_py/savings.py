@@ -107,7 +107,8 @@ class Side:
     cycle_time [s] that it was asked for (0: free).
 
     movements, report, hops: empty where `problem` says why there is none. time (N,) s, watts (N,):
-    power at the mains, means over even steps. saving: of today's energy; where the line needs more
+    power at the mains, means over even steps; high (N,): the largest of each step, without it the
+    means. saving: of today's energy; where the line needs more
     time than today's program takes, of today's that waits at its end. peak: ends of the 90 %
     interval of its peak power [W].
     """
@@ -119,12 +120,15 @@ class Side:
     hops: tuple[Hop, ...] = ()
     time: FloatArray = field(default_factory=lambda: np.zeros(0))
     watts: FloatArray = field(default_factory=lambda: np.zeros(0))
+    high: FloatArray = field(default_factory=lambda: np.zeros(0))
     saving: Saving = field(default_factory=Saving)
     problem: str = ""
     peak: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        for name in ("time", "watts"):
+        if not len(self.high):
+            set_field(self, "high", self.watts)
+        for name in ("time", "watts", "high"):
             set_field(self, name, read_only(getattr(self, name), name, (None,)))
 
     @property

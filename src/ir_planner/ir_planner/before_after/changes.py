@@ -132,12 +132,11 @@ def side_of(
     report = replace(report, energy_low=whole.low, energy_high=whole.high)
     if parameters is not None:
         report = replace(report, power_parameters=parameters.name)
-    time, watts = _power(steps, request)
+    time, watts, high = _power(steps, request)
     hops = tuple(_hop(hop) for hop in hops_of(program))
     peak = peak_interval(steps, request)
-    return Side(
-        name, cycle_time, steps, report, hops, time, watts, saved, "", (peak.low, peak.high)
-    )
+    within = (peak.low, peak.high)
+    return Side(name, cycle_time, steps, report, hops, time, watts, high, saved, "", within)
 
 
 def hops_of(program: Costed) -> list[CostedHop]:
@@ -180,10 +179,13 @@ def _hop(hop: CostedHop) -> Hop:
 
 def _power(
     steps: Sequence[PlannedMovement], request: ProgramRequest
-) -> tuple[FloatArray, FloatArray]:
-    """Times (N,) [s] and power at the mains (N,) [W]; a pause has its mean."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Times (N,) [s], mean and largest power at the mains (N,) [W] of even steps around them; a
+    pause has its mean.
+    """
     ends = [0.0]
     spent = [0.0]
+    peaks = list[tuple[FloatArray, FloatArray]]()
     for step in steps:
         at = ends[-1]
         joules = spent[-1]
@@ -196,14 +198,20 @@ def _power(
             )
             energy = movement_energy(step.trajectory, scene)
             shares = np.cumsum(energy.watts) * (step.report.energy / max(energy.watts.sum(), 1e-9))
-            ends += (at + energy.times[:-1] + 0.5 * energy.dt - step.trajectory.times[0]).tolist()
+            times = at + energy.times - step.trajectory.times[0]
+            largest = step.report.peak_power / max(float(energy.watts.max()), 1e-9)
+            peaks.append((times, energy.watts * largest))
+            ends += (times[:-1] + 0.5 * energy.dt).tolist()
             spent += (joules + shares[:-1]).tolist()
         ends.append(at + step.duration)
         spent.append(joules + step.report.energy)
     count = int(np.clip(ends[-1] / _STEP, 1, _MOST))
     edges = np.linspace(0.0, ends[-1], count + 1)
     watts = np.diff(np.interp(edges, ends, spent)) / np.maximum(np.diff(edges), 1e-9)
-    return 0.5 * (edges[1:] + edges[:-1]), watts
+    high = watts.copy()
+    for times, powers in peaks:
+        np.maximum.at(high, np.clip(np.searchsorted(edges, times) - 1, 0, count - 1), powers)
+    return 0.5 * (edges[1:] + edges[:-1]), watts, high
 
 
 # The changes from one program to another: which movement, which pause, how, and how much that

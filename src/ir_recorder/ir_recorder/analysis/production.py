@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ir_description import interval_over
+from ir_description import Cell, PowerData, interval_over
 from ir_msgs_py.modes import REST_MODES
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.report import PlannedMovement
@@ -374,7 +374,12 @@ def idle_watts(analysis: Analysis) -> dict[str, float]:
     data, _ = recorded_power_data(analysis.recording, cell)
     ends = [step.load for step in analysis.recording.planned[-1:]]
     ends += [result.step.movement.load for result in analysis.steps[-1:]]
-    loads = carried(cell, ends[-1] if ends else NO_LOAD)
+    return home_watts(cell, ends[-1] if ends else NO_LOAD, data)
+
+
+def home_watts(cell: Cell, load: str, data: PowerData) -> dict[str, float]:
+    """W at rest at machine home with a load, in each power mode that the controller has."""
+    loads = carried(cell, load)
     return {
         mode: resting_watts(mode, cell.robot.machine_home, cell, loads, data) for mode in REST_MODES
     }

@@ -24,7 +24,7 @@ from ir_recorder.analysis.tending import Span
 from ir_values.arrays import BoolArray, FloatArray
 
 _ROWS = 2000  # instants that are looked at together
-_STAMPS = 0.05  # s: readings of two robots that come every 10 ms, and the answers of their nodes
+STAMPS = 0.05  # s: readings of two robots that come every 10 ms, and the answers of their nodes
 
 
 @dataclass(frozen=True)
@@ -176,4 +176,4 @@ def _turns(analyses: Mapping[str, Analysis]) -> Iterator[Finding]:
         (one, spans), (other, its_spans) = passes.items()
         together = sum(span.within(its.begin, its.end) for span in spans for its in its_spans)
         why = f"{one} and {other} pass it in turns: {len(spans)} and {len(its_spans)} times"
-        yield at_most(f"both robots in {signal}", together, _STAMPS, "s", why)
+        yield at_most(f"both robots in {signal}", together, STAMPS, "s", why)

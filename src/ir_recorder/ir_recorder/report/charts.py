@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from ir_recorder.report.number_text import joules, kilowatt_hours, seconds, text
 # Every piece is the net energy of one consumer over the movement. The sum of both sides is what the
 # mains gave, but for what stays in the capacitors; it stands beside the bar.
 
+_ALONG = 2.5  # labels of cycle times, about: they are wide
 TICKS = 5  # of the axis, about: labels of "12.3 kJ" stay apart on a telephone
 
 
@@ -166,7 +167,7 @@ def mark(index: int, x: float, y: float, inside: str) -> str:
 
 WIDTH = 560.0
 HEIGHT = 300.0
-_LEFT = 84.0
+_LEFT = 108.0
 _RIGHT = 150.0
 _TOP = 18.0
 _BOTTOM = 44.0
@@ -174,6 +175,8 @@ _BOTTOM = 44.0
 _NAME = 130.0
 _LINE = 18.0
 _HALF = 4.0
+_SAME_TIME = 0.01  # of the longest cycle: times that differ by less are one
+_BAR_ROW = 44.0  # of a bar with the words above it
 # span of an axis: what differs by less reads alike
 _LEAST_S = 0.05
 _LEAST_J = 5.0
@@ -220,12 +223,52 @@ def front_section(analysis: Analysis, planned: Sequence[ProgramPoint] = ()) -> s
     if total is not None:
         points.append(Point("common program", total.seconds, total.common, "predicted"))
         points.append(Point("planned in its time", total.seconds, total.planned, "predicted"))
-    hint = (
-        "Left is faster, down is cheaper; the line joins programs that no other one beats in both."
+    return front_part(points)
+
+
+def front_part(points: Sequence[Point], show: Callable[[float], str] = joules) -> str:
+    """Section of the page: the drawing, or bars of energy where all programs take one time but for
+    a hundredth; "" for fewer than two points.
+    """
+    if len(points) < 2:
+        return ""
+    if _one_time(points):
+        hint = "All take the same time but for a hundredth, so their energies are what differs."
+        head = f'<h2>Energy of a cycle</h2><p class="hint">{hint}</p>'
+        return f'<section id="front">{head}{_energy_bars(points, show)}</section>'
+    joined = len(pareto(points)) > 1
+    hint = "Left is faster, down is cheaper" + (
+        "; the line joins programs that no other one beats in both." if joined else "."
     )
     head = f'<h2>Energy over cycle time</h2><p class="hint">{hint}</p>'
-    drawn = front_chart(points)
-    return f'<section id="front">{head}{drawn}</section>' if drawn else ""
+    return f'<section id="front">{head}{front_chart(points, show=show)}</section>'
+
+
+def _one_time(points: Sequence[Point]) -> bool:
+    times = [point.seconds for point in points]
+    return max(times) - min(times) < _SAME_TIME * max(times)
+
+
+def _energy_bars(points: Sequence[Point], show: Callable[[float], str]) -> str:
+    """A bar for each program, from zero on, with its energy and its time."""
+    most = max(max(point.energy for point in points), 1e-9)
+    named = [replace(point, name=point.name or "program of the front") for point in points]
+    high = _BAR_ROW * len(named)
+    rows = []
+    for k, point in enumerate(named):
+        top = _BAR_ROW * k
+        wide = max(point.energy, 0.0) / most * (WIDTH - 2.0)
+        words = f"{show(point.energy)} in {seconds(point.seconds)}, {point.source}"
+        rows.append(
+            f'<text class="name" x="0" y="{top + 14:g}">{text(point.name)}: {text(words)}</text>'
+            f'<rect class="s1" x="0" y="{top + 20:g}" width="{wide:.1f}" height="12"/>'
+        )
+    said = "; ".join(f"{p.name} {seconds(p.seconds)}, {show(p.energy)}, {p.source}" for p in named)
+    return (
+        '<div class="figure"><svg class="front" id="energy_over_cycle_time" '
+        f'viewBox="0 0 {WIDTH:g} {high:g}" role="img" aria-label="{text(said)}">'
+        f"{''.join(rows)}</svg></div>"
+    )
 
 
 def pareto(points: Sequence[Point]) -> list[Point]:
@@ -247,7 +290,9 @@ def front_chart(
         return ""
     times = [p.seconds for p in points]
     energies = [p.energy for p in points]
-    x = _Axis(min(times), max(times), _LEAST_S, _LEFT, WIDTH - _RIGHT, *_unit(times, _SECONDS))
+    x = _Axis(
+        min(times), max(times), _LEAST_S, _LEFT, WIDTH - _RIGHT, *_unit(times, _SECONDS), _ALONG
+    )
     unit = _unit(energies, _ENERGIES[show])
     y = _Axis(min(energies), max(energies), _LEAST_J, HEIGHT - _BOTTOM, _TOP, *unit)
     line = " ".join(f"{x.at(p.seconds):.1f},{y.at(p.energy):.1f}" for p in pareto(points))
@@ -268,7 +313,9 @@ def _unit(values: Sequence[float], units: _Units) -> tuple[str, float]:
 
 @dataclass(frozen=True)
 class _Axis:
-    """From values to drawing units, with a margin of a tenth; labels are multiples of a unit."""
+    """From values to drawing units, from the label below a margin of a tenth to the one above;
+    labels are multiples of a unit.
+    """
 
     low: float
     high: float
@@ -277,6 +324,7 @@ class _Axis:
     end: float
     unit: str
     scale: float
+    labels: float = TICKS
 
     @property
     def span(self) -> float:
@@ -284,18 +332,22 @@ class _Axis:
         return max(self.high - self.low, self.least)
 
     @property
-    def first(self) -> float:
-        """The value at the start."""
-        return 0.5 * (self.low + self.high) - 0.6 * self.span
+    def lines(self) -> tuple[float, int, int]:
+        """The step of its labels, and which multiples of it are the first and the last."""
+        step = tick_step(1.2 * self.span / self.scale * TICKS / self.labels)
+        middle = 0.5 * (self.low + self.high)
+        first = math.floor((middle - 0.55 * self.span) / self.scale / step)
+        last = math.ceil((middle + 0.55 * self.span) / self.scale / step)
+        return step, first, last
 
     def at(self, value: float) -> float:
-        return self.start + (value - self.first) / (1.2 * self.span) * (self.end - self.start)
+        step, first, last = self.lines
+        share = (value / self.scale / step - first) / (last - first)
+        return self.start + share * (self.end - self.start)
 
     def ticks(self) -> dict[float, str]:
         """Where lines stand, with their labels: as many decimals as their step needs."""
-        step = tick_step(1.2 * self.span / self.scale)
-        first = math.ceil(self.first / self.scale / step)
-        last = math.floor((self.first + 1.2 * self.span) / self.scale / step)
+        step, first, last = self.lines
         decimals = max(0, math.ceil(-math.log10(step) - 1e-9))
         return {
             k * step * self.scale: f"{k * step:,.{decimals}f} {self.unit}".replace(",", " ")

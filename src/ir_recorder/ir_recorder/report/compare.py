@@ -16,19 +16,23 @@ from ir_msgs_py.savings import ProgramSavings
 from ir_recorder.analysis import Analysis, Finding
 from ir_recorder.analysis.flows import energy_flows
 from ir_recorder.analysis.production import (
+    Amount,
     Production,
     drives_only,
+    idle_watts,
     planned_clearance,
     planned_share,
     production_of,
 )
 from ir_recorder.analysis.results import ProgramTotals, Share
 from ir_recorder.analysis.steps import step_label
-from ir_recorder.report.charts import Point, front_chart
+from ir_recorder.report.charts import Point, front_part
 from ir_recorder.report.costs import (
     Costs,
+    IdleSaving,
     assumed_section,
     counted_with,
+    idle_saving,
     payback,
     yearly_money,
     yearly_span,
@@ -47,7 +51,7 @@ from ir_recorder.report.number_text import (
     watts,
 )
 from ir_recorder.report.page import PAGE_START, asset
-from ir_recorder.report.series import Curves, Json, packed
+from ir_recorder.report.series import Curves, Json, packed, stretches
 from ir_recorder.report.tables import table
 from ir_recorder.report.whole_line import of_recording, with_ends
 from ir_values.files import ANYWHERE, FileRoots
@@ -88,7 +92,7 @@ def comparison_html(compared: Sequence[Compared], costs: Costs | None = None) ->
         "supply": "" if any(map(drives_only, analyses)) else ", at the mains",
         "assumed": assumed_section(costs or Costs()),
         "figures": _figures(compared, names),
-        "front": front_chart(_points(analyses, names), show=kilowatt_hours),
+        "front": front_part(_points(analyses, names), kilowatt_hours),
         "steps": _steps(analyses, names),
         "style": asset("page.css"),
         "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
@@ -134,14 +138,16 @@ def _problems(analyses: Sequence[Analysis], names: Sequence[str]) -> str:
 
 def _paid(compared: Sequence[Compared], names: Sequence[str], costs: Costs) -> str:
     """The figures for those who pay, as the report of each recording has them."""
-    cycles = [production_of(analysis) for analysis, _ in compared]
-    first = None if _apart([analysis for analysis, _ in compared]) else cycles[0]
+    analyses = [analysis for analysis, _ in compared]
+    cycles = [production_of(analysis) for analysis in analyses]
+    first = None if _apart(analyses) else cycles[0]
     rows = [
         ("plant", *(text(plant_of(a)) for a, _ in compared)),
         ("checks", *(text(checked(checks, a)[1]) for a, checks in compared)),
         ("a year of such cycles", *(_year(cycle, first, costs) for cycle in cycles)),
         ("saved by its plan, a year", *(_year_saved(cycle, costs) for cycle in cycles)),
-        ("that is, of the whole line", *(_of_line(analysis, costs) for analysis, _ in compared)),
+        *_around_the_clock(analyses, cycles, costs),
+        ("energy of the whole line", *(_of_line(analysis, costs) for analysis, _ in compared)),
         ("a cycle", *(_cycle(cycle) for cycle in cycles)),
     ]
     hint = (
@@ -187,14 +193,51 @@ def _year_saved(cycle: Production | None, costs: Costs) -> str:
     return f"<b>{text(yearly_money(price.value, costs.currency))}</b>{small}"
 
 
+def _around_the_clock(
+    analyses: Sequence[Analysis], cycles: Sequence[Production | None], costs: Costs
+) -> list[tuple[str, ...]]:
+    """Rows of what rest saves outside of the shifts, and of both together; none where it is not
+    known of any.
+    """
+    found = [
+        None if cycle is None else idle_saving(idle_watts(analysis), costs)
+        for analysis, cycle in zip(analyses, cycles, strict=True)
+    ]
+    if not any(found):
+        return []
+    saved = [None if cycle is None else costs.saving_of_year(cycle) for cycle in cycles]
+    nights = (DASH if idle is None else _night(idle, costs) for idle in found)
+    both = (
+        DASH if idle is None or amount is None else f"<b>{text(_both(amount, idle, costs))}</b>"
+        for idle, amount in zip(found, saved, strict=True)
+    )
+    return [
+        ("saved at night and at weekends, a year", *nights),
+        ("both together, a year", *both),
+    ]
+
+
+def _night(idle: IdleSaving, costs: Costs) -> str:
+    today, then = (yearly_money(cost, costs.currency) for cost in (idle.left_alone, idle.deepest))
+    return (
+        f"<b>{text(yearly_money(idle.saved, costs.currency))}</b>"
+        f"<small>{text(today)} with the brakes closed, {text(then)} in {idle.mode}</small>"
+    )
+
+
+def _both(amount: Amount, idle: IdleSaving, costs: Costs) -> str:
+    return yearly_money(costs.money(amount.value) + idle.saved, costs.currency)
+
+
 def _of_line(analysis: Analysis, costs: Costs) -> str:
     found = of_recording(analysis, costs)
     if found is None:
         return DASH
-    word = found.line.gain()[0]
+    word, line = found.line.gain()
     return (
-        f"<b>{with_ends(found.line)} {word}</b>"
-        f"<small>{with_ends(found.factory)} of the factory's</small>"
+        f"<b>{line.value:.1f} % {'less' if word == 'saved' else word}</b>"
+        + (f"<small>{line.low:.1f} to {line.high:.1f} %</small>" if line.high > line.low else "")
+        + f"<small>of the factory {with_ends(found.factory)}</small>"
     )
 
 
@@ -371,18 +414,19 @@ def _longest(analyses: Sequence[Analysis]) -> float:
 
 
 def _powers(analyses: Sequence[Analysis], names: Sequence[str]) -> dict[str, Json]:
-    """Mains power from the start of each program on one grid: means, so that its joules are the
-    meter's.
-    """
+    """Mains power from the start of each program on one grid, every peak kept."""
     edges = np.linspace(0.0, _longest(analyses), _POINTS + 1)
     drawn = [k for k, analysis in enumerate(analyses) if _driven(analysis)]
-    value = np.zeros((_POINTS, len(drawn)))
+    low = np.zeros((_POINTS, len(drawn)))
+    high = np.zeros((_POINTS, len(drawn)))
     for k, analysis in enumerate(analyses[one] for one in drawn):
         power = analysis.recording.power
         if power is not None:
-            spent = np.interp(edges + analysis.steps[0].step.start, power.time, power.energy)
-            value[:, k] = np.diff(spent) / np.diff(edges)
-    curves = Curves("power at the mains", "W", (edges[1:] + edges[:-1]) / 2.0, value)
+            shape = stretches(edges, power.time - analysis.steps[0].step.start, power.power)
+            low[:, k] = shape.low
+            high[:, k] = shape.high
+    middle = (edges[1:] + edges[:-1]) / 2.0
+    curves = Curves("power at the mains", "W", middle, high, low=low)
     programs = [analyses[k].program for k in drawn]
     ends = [program.whole.seconds if program is not None else 0.0 for program in programs]
     return {**packed(curves), "names": [names[k] for k in drawn], "ends": ends}

@@ -300,7 +300,8 @@ def costs_section(analysis: Analysis, costs: Costs) -> str:
     return (
         '<section id="costs"><h2>What a cycle costs</h2>'
         f'<p class="hint">{text(origin)}; savings are predicted, with their '
-        f"90 % interval.{text(notes)} {counted_with(costs)}</p>"
+        f"90 % interval, of as many cycles as the common program makes.{text(notes)} "
+        f"{counted_with(costs)}</p>"
         f"{table(heads, rows, 'What a cycle costs')}</section>"
     )
 
@@ -318,7 +319,7 @@ def _yearly_cycles(pace: float, costs: Costs) -> str:
 def cycles_of_year(pace: float, costs: Costs) -> str:
     """How many cycles a year counts, in words."""
     made = f"{costs.cycles_per_year(pace):,.0f}".replace(",", " ")
-    return f"{made} cycles of {seconds(pace)}"
+    return f"{made} cycles, one each {seconds(pace)}"
 
 
 def idle_money(energy: float, costs: Costs) -> str:
@@ -484,7 +485,8 @@ def counted_with(costs: Costs) -> str:
         f"{costs.shift_hours:g} h on {costs.days_per_year:g} days a year, "
         f"{100.0 * costs.availability:g} % of them in cycles, {origin if own else 'all assumed'}"
     )
-    return f'{text(words)}: <a href="#assumed">all values, and how to give yours</a>.'
+    rounded = "Each amount is rounded by itself, so sums may differ by one in the last digit."
+    return f'{text(words)}: <a href="#assumed">all values, and how to give yours</a>. {rounded}'
 
 
 def assumed_section(costs: Costs) -> str:

@@ -32,24 +32,25 @@ from ir_recorder.reading.reader import read_recording
 from ir_recorder.report.costs import (
     LEFT_ALONE,
     Costs,
+    IdleSaving,
     assumed_section,
     counted_with,
     idle_money,
     idle_saving,
     idle_sentence,
-    payback,
     small_span,
     yearly_money,
     yearly_span,
 )
 from ir_recorder.report.files import write_output
-from ir_recorder.report.headline import Tile, started
+from ir_recorder.report.headline import started
 from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import (
     DASH,
     ENGLISH,
     kilograms,
     kilowatt_hours,
+    modes_as_words,
     percent,
     seconds,
     significant,
@@ -57,6 +58,7 @@ from ir_recorder.report.number_text import (
     watts,
 )
 from ir_recorder.report.page import PAGE_START, asset, folded
+from ir_recorder.report.paid import Paid, Tile, row_of
 from ir_recorder.report.step_table import TableValue, write_columns
 from ir_recorder.report.tables import table
 from ir_recorder.report.whole_line import WholeLine, line_section, of_whole_line
@@ -294,10 +296,9 @@ def at_mains(members: Sequence[Member]) -> list[Member]:
     return [member for member in members if member.robot not in apart]
 
 
-def fleet_of_line(members: Sequence[Member], costs: Costs) -> WholeLine | None:
-    """What all plans together save in a year, as a share of the line and of the factory; None where
-    no recording says it, or it is open whether anything is saved. Several
-    recordings of a robot are averaged.
+def _saved_and_common(members: Sequence[Member], costs: Costs) -> tuple[Amount | None, float]:
+    """Joules of a year that all plans together save, and those of the programs that they are held
+    against; None where no recording says it. Several recordings of a robot are averaged.
     """
     known = [(m.robot, m.cycle) for m in at_mains(members) if m.cycle.savings is not None]
     count = Counter(robot for robot, _ in known)
@@ -310,8 +311,17 @@ def fleet_of_line(members: Sequence[Member], costs: Costs) -> WholeLine | None:
             total = cycle.savings.total
             cycles = costs.cycles_per_year(total.seconds or cycle.seconds) / count[robot]
             common += total.common * cycles
-    together = sum_of(saved)
-    return None if together.doubt else of_whole_line(together, common, costs)
+    return (sum_of(saved) if saved else None), common
+
+
+def fleet_of_line(members: Sequence[Member], costs: Costs) -> WholeLine | None:
+    """What all plans together save in a year, as a share of the line and of the factory; None where
+    no recording says it, or it is open whether anything is saved.
+    """
+    together, common = _saved_and_common(members, costs)
+    if together is None or together.doubt:
+        return None
+    return of_whole_line(together, common, costs)
 
 
 def by_mode(members: Sequence[Member], costs: Costs) -> dict[str, dict[str, float]]:
@@ -398,46 +408,37 @@ def fleet_html(
         f"<style>{asset('page.css')}</style></head><body><header><div><h1>{text(title)}</h1>"
         f'<p class="subtitle">{text(_origins(members))}; a year of each robot, one cycle after '
         "the other</p>"
-        f"</div></header><main>{_tiles(robots, prices)}{_problems(left_out)}{''.join(sections)}"
+        f"</div></header><main>{_paid(known, prices)}{_tiles(robots, prices)}"
+        f"{_problems(left_out)}{''.join(sections)}"
         f"{assumed_section(prices)}</main>"
         f"<script>{asset('export.js')}\nexportButtons();</script></body></html>"
     )
 
 
 def _tiles(robots: Sequence[Robot], costs: Costs) -> str:
-    """The fleet in three figures."""
+    """A year of the fleet in two figures."""
     summed = [robot for robot in robots if not robot.drives_only]
     if not summed:
         return f'<p class="hint">{_apart(robots)}</p>'
     yearly = sum_of([robot.yearly for robot in summed])
-    saved = [robot.saved for robot in summed if robot.saved is not None]
-    word, of_it = sum_of(saved).gain()
     price = yearly_money(costs.money(yearly.value), costs.currency)
-    found = [
-        Tile("energy a year", kilowatt_hours(yearly.value), (counted(len(summed), "robot"),)),
-        Tile("costs a year", price, (f"{kilograms(costs.co2(yearly.value))} of CO2",)),
-    ]
-    if saved:
-        between = _money_between(of_it, costs)
-        found.append(
-            Tile(
-                f"{word} a year by plans, predicted",
-                yearly_money(costs.money(of_it.value), costs.currency),
-                (
-                    kilowatt_hours(of_it.value),
-                    f"90 % interval {between} {costs.currency}",
-                    of_it.doubt,
-                    _paid(saved, costs),
-                ),
-            )
-        )
-    return f'<section class="tiles">{"".join(tile.html() for tile in found)}</section>'
+    return row_of(
+        [
+            Tile("energy a year", kilowatt_hours(yearly.value), (counted(len(summed), "robot"),)),
+            Tile("costs a year", price, (f"{kilograms(costs.co2(yearly.value))} of CO2",)),
+        ]
+    )
 
 
-def _paid(saved: Sequence[Amount], costs: Costs) -> str:
-    """When an hour for each robot is paid back."""
-    found = payback(mean_of(saved), costs)
-    return f"{found}, for each robot in the mean" if found and len(saved) > 1 else found
+def _paid(members: Sequence[Member], costs: Costs) -> str:
+    """What those who pay ask first, of all robots together."""
+    saved, common = _saved_and_common(members, costs)
+    idle = _idle_saving(members, costs)
+    if saved is None:
+        return Paid(None, 0.0, idle, None).html(costs)
+    robots = len({member.robot for member in members if member.cycle.savings is not None})
+    notes = (f"{counted(robots, 'robot')}, predicted",)
+    return Paid(saved, common, idle, fleet_of_line(members, costs), notes, robots).html(costs)
 
 
 def _robots(robots: Sequence[Robot], costs: Costs) -> str:
@@ -519,12 +520,12 @@ def _around_the_clock(members: Sequence[Member], robots: Sequence[Robot], costs:
     hint = (
         f"{significant(costs.idle_hours, 6)} hours a year lie outside of the shifts; the columns "
         "of modes say what rest takes in them, by the data. The peak of all robots is the sum of "
-        f"theirs: as if all came at once. {_idle_saved(members, costs)}"
+        f"theirs: as if all came at once. {idle_sentence(_idle_saving(members, costs), costs)}"
     )
     return f'<p class="hint">{text(hint)}</p>{table(heads, rows, "Peak and rest")}'
 
 
-def _idle_saved(members: Sequence[Member], costs: Costs) -> str:
+def _idle_saving(members: Sequence[Member], costs: Costs) -> IdleSaving | None:
     """What hibernation saves outside of the shifts, of all robots whose rest is known."""
     rests: dict[str, dict[str, float]] = {}
     for member in members:
@@ -532,7 +533,7 @@ def _idle_saved(members: Sequence[Member], costs: Costs) -> str:
         own.update({mode: max(power, own.get(mode, 0.0)) for mode, power in member.idle.items()})
     modes = set.intersection(*(set(rest) for rest in rests.values())) if rests else set()
     watts_of_all = {mode: sum(rest[mode] for rest in rests.values()) for mode in modes}
-    return idle_sentence(idle_saving(watts_of_all, costs), costs)
+    return idle_saving(watts_of_all, costs)
 
 
 def _rest_head(mode: str) -> str:
@@ -596,7 +597,7 @@ def _clock_row(
 
 def _shown(name: str) -> str:
     """A mode as people read it; names of movements as they are."""
-    return name.replace("_", " ").lower() if name.isupper() else name
+    return name.replace("_", " ").lower() if name.isupper() else modes_as_words(name)
 
 
 def _yearly(amount: Amount, costs: Costs) -> tuple[str, str]:

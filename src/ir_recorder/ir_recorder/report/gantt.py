@@ -10,6 +10,8 @@ from ir_recorder.analysis.results import mode_name
 from ir_recorder.analysis.tending import Span
 from ir_recorder.reading.recording import PowerSeries
 from ir_recorder.report.number_text import mode_words, seconds, text, watts
+from ir_recorder.report.series import stretches
+from ir_values.arrays import FloatArray
 
 # It is as narrow as a telephone, so that its letters stay readable there.
 
@@ -20,7 +22,7 @@ _ROW = 20.0
 _BAR = 13.0
 _POWER = 54.0
 _AXIS = 22.0
-_BINS = 120  # means of power over a part's time
+_BINS = 300  # stretches of a chart's time; of each the lowest and the highest power are drawn
 _TICKS = 6
 _STEPS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0)
 
@@ -47,6 +49,12 @@ def mode_bars(power: PowerSeries, span: Span) -> list[Bar]:
     ]
 
 
+def together(meters: Sequence[PowerSeries]) -> tuple[FloatArray, FloatArray]:
+    """Times (N,) s of all readings, and the power (N,) W of all meters together at each."""
+    time = np.unique(np.concatenate([meter.time for meter in meters]))
+    return time, np.sum([np.interp(time, m.time, m.power) for m in meters], axis=0)
+
+
 _MODES = ("MOVING", "STAND_ON_MOTORS", "STAND_ON_BRAKES", "BUS_POWER_OFF", "HIBERNATION")
 
 
@@ -62,7 +70,7 @@ def legend(kinds: Mapping[str, str]) -> str:
     )
     between = '<span><i class="key"></i>between two modes</span>'
     return (
-        f'<p class="key-row">{words}<span>power: mean of each {_BINS}th of the time</span></p>'
+        f'<p class="key-row">{words}<span>power: from its lowest to its highest value</span></p>'
         f'<p class="key-row"><b>mode:</b> {modes}{between}</p>'
     )
 
@@ -92,17 +100,16 @@ class Gantt:
         self._height += _ROW
 
     def power(self, meters: Sequence[PowerSeries]) -> None:
-        """Mean power at the mains, of all meters together."""
+        """Power at the mains of all meters together, every peak kept."""
         edges = np.linspace(self._span.begin, self._span.end, _BINS + 1)
-        energy = np.sum([np.interp(edges, m.time, m.energy) for m in meters], axis=0)
-        means = np.diff(energy) / np.diff(edges)
-        most = max(float(means.max()), 1.0)
+        shape = stretches(edges, *together(meters))
+        most = max(float(shape.high.max()), 1.0)
         low = self._height + _POWER
-        heights = low - (_POWER - 8.0) * np.maximum(means, 0.0) / most
-        middles = 0.5 * (edges[1:] + edges[:-1])
+        ends = np.stack([shape.low, shape.high], axis=1).ravel()
+        heights = low - (_POWER - 8.0) * np.maximum(ends, 0.0) / most
         points = " ".join(
             f"{self._at(x):.1f},{y:.1f}"
-            for x, y in zip(middles.tolist(), heights.tolist(), strict=True)
+            for x, y in zip(np.repeat(shape.time, 2).tolist(), heights.tolist(), strict=True)
         )
         self._parts.append(f'<text x="0" y="{self._height + 16:.1f}">{watts(most)}</text>')
         self._parts.append(f'<text x="0" y="{low:.1f}">0 W</text>')

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
 from ir_msgs_py.savings import one_sided
@@ -37,6 +36,7 @@ from ir_recorder.report.number_text import (
     kilograms,
     kilowatt_hours,
     millimetres,
+    modes_as_words,
     number,
     percent,
     seconds,
@@ -45,22 +45,10 @@ from ir_recorder.report.number_text import (
     text,
     watts,
 )
+from ir_recorder.report.paid import Paid, Tile
+from ir_recorder.report.whole_line import of_recording
 
 _STYLES = {Verdict.HOLDS: "good", Verdict.FAILS: "bad", Verdict.NOT_CHECKED: "open"}
-
-
-@dataclass(frozen=True)
-class Tile:
-    """One figure: its name, the value, and lines that explain it."""
-
-    name: str
-    value: str
-    notes: tuple[str, ...]
-
-    def html(self) -> str:
-        """As an element of the page."""
-        notes = "".join(f"<small>{text(note)}</small>" for note in self.notes if note)
-        return f'<div class="tile"><span>{text(self.name)}</span><b>{text(self.value)}</b>{notes}</div>'  # noqa: E501
 
 
 _PREDICTED = "predicted, not driven"
@@ -130,7 +118,7 @@ def failing(checks: Sequence[Finding]) -> str:
     if not failed:
         return ""
     items = [
-        f"{check.name}: {number(check.measured, check.unit)}, allowed "
+        f"{modes_as_words(check.name)}: {number(check.measured, check.unit)}, allowed "
         f"{interval(check.low, check.high, check.unit)}"
         for check in failed[:_NAMED]
     ]
@@ -160,10 +148,10 @@ def notes(analysis: Analysis) -> str:
 
 
 def tiles(analysis: Analysis, costs: Costs | None = None) -> str:
-    """The figures for who pays; those of the program where one was executed."""
+    """A year, the cycle and its peak; those of the program where one was executed."""
     program = analysis.program
     prices = costs or Costs()
-    paid = (_yearly(analysis, prices), _saved(analysis), _idle_saved(analysis, prices))
+    paid = (_yearly(analysis, prices), _saved(analysis))
     if analysis.recording.only_planned and program is None:
         return _html([*paid, *_planned(analysis)])
     peak = Tile("peak power", watts(analysis.peak_power), ("of a 10 ms reading",))
@@ -171,6 +159,20 @@ def tiles(analysis: Analysis, costs: Costs | None = None) -> str:
         none = Tile("program", "none executed", ("figures of the whole recording only",))
         return _html([*paid, none, _recorded(analysis), peak, _clearance(analysis)])
     return _html([*paid, _unshortened(program) or _whole(analysis, program), peak])
+
+
+def paid_row(analysis: Analysis, costs: Costs) -> str:
+    """What those who pay ask first, as on every page; "" where nothing of it is known."""
+    cycle = production_of(analysis)
+    idle = idle_saving(idle_watts(analysis), costs) if cycle is not None else None
+    saved = costs.saving_of_year(cycle) if cycle is not None else None
+    if cycle is None or cycle.savings is None or saved is None:
+        return Paid(None, 0.0, idle, None).html(costs)
+    total = cycle.savings.total
+    pace = total.seconds or cycle.seconds
+    common = total.common * costs.cycles_per_year(pace)
+    notes = (f"{cycles_of_year(pace, costs)}, predicted", cycle.supply)
+    return Paid(saved, common, idle, of_recording(analysis, costs), notes).html(costs)
 
 
 def run_tiles(analysis: Analysis) -> str:
@@ -297,12 +299,13 @@ def _saved(analysis: Analysis) -> Tile | None:
     beside = "of" if word == "saved" else "than"
     energy = kilowatt_hours(amount.value)
     before = f"{energy} {beside} the common program's {kilowatt_hours(total.common)}"
+    paced = f"planned in its time, {seconds(total.seconds)}" if total.seconds else ""
     limit = cycle.supply if cycle is not None else ""
     name = "saved by its plan" if word == "saved" else "more by its plan"
     return Tile(
         name,
         f"{100.0 * abs(total.share):.1f} %",
-        (f"{before}, predicted", within, amount.doubt, limit),
+        (f"{before}, predicted", paced, within, amount.doubt, limit),
     )
 
 
@@ -321,28 +324,6 @@ def _yearly(analysis: Analysis, costs: Costs) -> Tile | None:
     made = f"{cycles_of_year(cycle.pace, costs)} in shifts, without nights and weekends"
     lines = (made, co2, assumed, cycle.supply)
     return Tile("a year of such cycles", price, lines)
-
-
-def _idle_saved(analysis: Analysis, costs: Costs) -> Tile | None:
-    """What the deepest mode saves outside of the shifts, and what shifts and nights take with and
-    without it.
-    """
-    found = idle_saving(idle_watts(analysis), costs)
-    cycle = production_of(analysis)
-    if found is None or cycle is None:
-        return None
-    worked = costs.money(costs.energy_of_year(cycle).value)
-    sums = [
-        yearly_money(worked + cost, costs.currency) for cost in (found.left_alone, found.deepest)
-    ]
-    return Tile(
-        "outside of shifts, saved a year",
-        yearly_money(found.saved, costs.currency),
-        (
-            f"{found.mode} instead of only closing the brakes",
-            f"shifts and nights together {sums[0]}, then {sums[1]}",
-        ),
-    )
 
 
 def _parts(program: ProgramTotals, origin: str) -> list[Tile]:

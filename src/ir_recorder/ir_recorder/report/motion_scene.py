@@ -27,6 +27,7 @@ from ir_recorder.report.series import (
     long_rests,
     packed,
     quantised,
+    stretches,
 )
 from ir_values.arrays import FloatArray
 
@@ -158,8 +159,8 @@ def rests_of(side: Side) -> list[Span]:
 
 
 def power_curves(sides: Sequence[Side]) -> dict[str, Json]:
-    """Power at the mains of all programs on one grid, each from its start; a few points in rests
-    that all have.
+    """Power at the mains of all programs on one grid, each from its start, every peak kept; a few
+    points in rests that all have.
     """
     end = max(side.report.duration for side in sides)
     time = np.linspace(0.0, end, 8 * _POINTS)
@@ -171,8 +172,12 @@ def power_curves(sides: Sequence[Side]) -> dict[str, Json]:
     moving = np.flatnonzero(~resting)
     kept = moving[:: max(1, len(moving) // _POINTS)]
     time = time[np.union1d(kept, np.flatnonzero(resting)[::64])]
-    value = np.column_stack([np.interp(time, side.time, side.watts, right=0.0) for side in sides])
-    curves = packed(Curves("power at the mains, predicted", "W", time, value))
+    middle = (time[1:] + time[:-1]) / 2.0
+    over = [middle > side.report.duration for side in sides]
+    lows = [stretches(time, side.time, side.watts).low for side in sides]
+    highs = [stretches(time, side.time, side.high).high for side in sides]
+    low, high = (np.where(np.transpose(over), 0.0, np.transpose(own)) for own in (lows, highs))
+    curves = packed(Curves("power at the mains, predicted", "W", middle, high, low=low))
     ends: list[Json] = [side.report.duration for side in sides]
     return {**curves, "names": [side.name for side in sides], "ends": ends}
 

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 from collections.abc import Callable
 from html import escape
 from unicodedata import category
+
+from ir_msgs_py.modes import Mode
 
 DASH = "–"
 ENGLISH = "en"
 LOCALES = (ENGLISH, "de")
 """Of CSV files: decimals with a point and commas between columns, or a comma and semicolons."""
+_MODES = re.compile(
+    rf"\b(?:{'|'.join(mode.name for mode in Mode if '_' in mode.name)}|HIBERNATION)\b"
+)
 _UNSEEN = ("Cc", "Cf", "Cs")  # categories of Unicode: control, format, surrogate
 
 
@@ -135,6 +141,11 @@ def span_of(low: float, high: float, show: Callable[[float], str]) -> str:
 def mode_words(name: str) -> str:
     """A mode's name as words: "bus power off"."""
     return name.lower().replace("_", " ")
+
+
+def modes_as_words(words: str) -> str:
+    """A sentence or label, names of modes in it as words."""
+    return _MODES.sub(lambda match: mode_words(match[0]), words)
 
 
 def text(value: object) -> str:

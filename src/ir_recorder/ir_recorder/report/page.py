@@ -22,7 +22,16 @@ from ir_recorder.report.costs import (
 )
 from ir_recorder.report.data import page_data
 from ir_recorder.report.files import write_output
-from ir_recorder.report.headline import failing, notes, run_tiles, source, subtitle, tiles, verdict
+from ir_recorder.report.headline import (
+    failing,
+    notes,
+    paid_row,
+    run_tiles,
+    source,
+    subtitle,
+    tiles,
+    verdict,
+)
 from ir_recorder.report.methods import methods_section
 from ir_recorder.report.number_text import joules, text
 from ir_recorder.report.sankey import sankey_section
@@ -113,6 +122,7 @@ def report_html(
         "verdict": verdict(checks, analysis),
         "failing": failing(checks),
         "notes": notes(analysis),
+        "paid": paid_row(analysis, prices),
         "tiles": tiles(analysis, prices),
         "run": run_tiles(analysis),
         "capacity": text(joules(controller.dc_link_capacity_energy)),

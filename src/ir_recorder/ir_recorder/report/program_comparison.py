@@ -11,16 +11,22 @@ from pathlib import Path
 
 from ir_description import Cell
 from ir_msgs_py.savings import BeforeAfter, Change, Side
-from ir_recorder.analysis.production import DRIVES_ONLY, OPEN, Amount, saved_amount
+from ir_recorder.analysis.production import (
+    DRIVES_ONLY,
+    OPEN,
+    Amount,
+    home_watts,
+    saved_amount,
+)
 from ir_recorder.report.cell_scene import cell_scene
-from ir_recorder.report.charts import Point, front_chart
+from ir_recorder.report.charts import Point, front_part
 from ir_recorder.report.costs import (
     J_PER_KWH,
     Costs,
     assumed_section,
     counted_with,
     cycles_of_year,
-    payback,
+    idle_saving,
     share_between,
     yearly_money,
     yearly_span,
@@ -41,6 +47,7 @@ from ir_recorder.report.number_text import (
     watts,
 )
 from ir_recorder.report.page import PAGE_START, asset
+from ir_recorder.report.paid import Paid, Tile, row_of
 from ir_recorder.report.series import long_rests
 from ir_recorder.report.step_table import TableValue, write_columns
 from ir_recorder.report.tables import table
@@ -82,7 +89,8 @@ def year_of(found: BeforeAfter, side: Side, costs: Costs) -> Year:
 
 # Figures of today's program and of the planner's as tables: each energy with its 90 % interval.
 
-WORK = {1: "a power mode", 2: "other times on the same path", 3: "another path"}
+MODE = 1
+WORK = {MODE: "a power mode", 2: "other times on the same path", 3: "another path"}
 _MEANINGS = {
     "same cycle time": "the planner's, in the time of today's",
     "free": "the planner's, as fast as pays (--time-value)",
@@ -92,49 +100,58 @@ Show = Callable[[float], str]
 _FIT = 0.999  # of the cycles: fewer are said
 
 
-def tiles(found: BeforeAfter, costs: Costs) -> str:
-    """The answer in five figures, of the side that the changes lead to."""
+def paid_row(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
+    """What those who pay ask first, of the side that the changes lead to."""
     side = found.planned
-    report = found.planned.report
+    counted = year_of(found, side, costs)
+    today = side.saving.common * counted.cycles_a_year
+    controller = cell.robot.controller
+    idle = None
+    line = None
+    if controller.counted:
+        idle = idle_saving(home_watts(cell, side.movements[-1].load, controller), costs)
+        line = of_saving(side.saving, costs)
+    before = yearly_money(costs.money(today), costs.currency)
+    notes = (f"today {before} a year", f"{cycles_of_year(counted.pace, costs)}, predicted")
+    return Paid(counted.saved, today, idle, line, notes).html(costs)
+
+
+def tiles(found: BeforeAfter, costs: Costs) -> str:
+    """The cycle in figures, of the side that the changes lead to."""
+    side = found.planned
+    report = side.report
     today = found.today.report
     saving = side.saving
     counted = year_of(found, side, costs)
     word, year = counted.saved.gain()
     _, cycle = saved_amount(saving).gain()
-    before = year_of(found, found.today, costs).energy
-    sure = "" if saving.certain else OPEN
-    between = share_between(cycle, saving.common)
-    shown = (
-        (f"{word} a cycle", f"{100.0 * abs(saving.share):.1f} %", between, sure),
-        (
-            f"{word} a year",
-            yearly_money(costs.money(year.value), costs.currency),
-            _within(year, costs),
-            f"today {yearly_money(costs.money(before.value), costs.currency)} a year",
-            cycles_of_year(counted.pace, costs),
-            payback(counted.saved, costs),
-        ),
-        (
-            f"CO2 {word} a year",
-            kilograms(costs.co2(year.value)),
-            f"{kilowatt_hours(year.value)} {'less' if word == 'saved' else 'more'}",
-        ),
-        (
-            "cycle time",
-            seconds(report.duration),
-            f"today {seconds(today.duration)}",
-            f"of the program \u201c{side.name}\u201d",
-        ),
-        (
-            "peak power",
-            watts(report.peak_power),
-            span_of(*side.peak, watts),
-            f"today {watts(today.peak_power)}",
-        ),
-    )
-    return "".join(
-        f'<div class="tile"><span>{text(name)}</span>{_cell(value, *lines)}</div>'
-        for name, value, *lines in shown
+    return row_of(
+        [
+            Tile(
+                f"{word} a cycle",
+                kilowatt_hours(cycle.value),
+                (
+                    saving.change,
+                    share_between(cycle, saving.common),
+                    "" if saving.certain else OPEN,
+                ),
+            ),
+            Tile(
+                f"CO2 {word} a year",
+                kilograms(costs.co2(year.value)),
+                (f"{kilowatt_hours(year.value)} {'less' if word == 'saved' else 'more'}",),
+            ),
+            Tile(
+                "cycle time",
+                seconds(report.duration),
+                (f"today {seconds(today.duration)}", f"of the program \u201c{side.name}\u201d"),
+            ),
+            Tile(
+                "peak power",
+                watts(report.peak_power),
+                (span_of(*side.peak, watts), f"today {watts(today.peak_power)}"),
+            ),
+        ]
     )
 
 
@@ -190,11 +207,16 @@ def _change(k: int, change: Change, cycles: float, costs: Costs) -> tuple[str, .
     saving = change.saving
     between = span_of(saving.saved_low, saving.saved_high, watt_hours)
     return (
-        f"{k}. {text(change.name)}<small>{text(WORK[change.work])}</small>",
+        f"{k}. {text(change.name)}<small>{text(WORK[change.work])}{_long(change)}</small>",
         text(change.words),
         _cell(watt_hours(saving.saved), between, "" if saving.certain else OPEN),
         text(yearly_money(costs.money(saving.saved * cycles), costs.currency)),
     )
+
+
+def _long(change: Change) -> str:
+    """How long a pause is, which tells it from others at its place."""
+    return f", pause of {seconds(change.seconds[0])}" if change.work == MODE else ""
 
 
 def hop_table(found: BeforeAfter) -> str:
@@ -202,8 +224,13 @@ def hop_table(found: BeforeAfter) -> str:
     sides = [side for side in (found.today, *found.sides) if side.found]
     keyed = [dict(_keyed(side)) for side in sides]
     keys = list(dict.fromkeys(key for own in keyed for key in own))
-    rows = [(text(key[0]), *(own.get(key, DASH) for own in keyed)) for key in keys]
+    rows = [(_numbered(*key), *(own.get(key, DASH) for own in keyed)) for key in keys]
     return table(("", *(f">{side.name}" for side in sides)), rows, "Movements and pauses")
+
+
+def _numbered(name: str, which: int) -> str:
+    """A movement or pause; from the second of a name on with its number."""
+    return text(name if which == 1 else f"{name}, number {which}")
 
 
 def _keyed(side: Side) -> Sequence[tuple[tuple[str, int], str]]:
@@ -333,11 +360,6 @@ def _money(energy: Amount, costs: Costs) -> str:
     )
 
 
-def _within(energy: Amount, costs: Costs) -> str:
-    between = _money(energy, costs)
-    return f"90 % interval {between}" if between else ""
-
-
 def _proof(side: Side) -> str:
     if not side.found:
         return text(f"none: {side.problem}")
@@ -387,6 +409,7 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
             f"{found.name} ({found.kind}) against what the planner makes of the same stops"
         ),
         "problems": _problems(found, cell),
+        "paid": paid_row(found, cell, prices),
         "tiles": tiles(found, prices),
         "figures": figure_table(found, prices),
         "assumptions": assumptions(prices),
@@ -395,7 +418,7 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
         "assumed": assumed_section(prices),
         "changes": change_table(found, prices),
         "hops": hop_table(found),
-        "front": front_chart([_point(side) for side in there], show=kilowatt_hours),
+        "front": front_part([_point(side) for side in there], kilowatt_hours),
         "choices": "".join(_choice(side, found.towards) for side in there[1:]),
         "style": asset("page.css") + asset("before_after.css"),
         "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),

@@ -11,17 +11,16 @@ import numpy as np
 
 from ir_recorder.analysis import Analysis, Finding
 from ir_recorder.analysis.results import StepResult
-from ir_recorder.analysis.robots import zone_passes
+from ir_recorder.analysis.robots import STAMPS, zone_passes
 from ir_recorder.analysis.tending import Span
 from ir_recorder.report.files import write_output
-from ir_recorder.report.gantt import Bar, Gantt, legend, mode_bars
-from ir_recorder.report.headline import Tile, failing, verdict
+from ir_recorder.report.gantt import Bar, Gantt, legend, mode_bars, together
+from ir_recorder.report.headline import failing, verdict
 from ir_recorder.report.number_text import DASH, seconds, text, watt_hours, watts
 from ir_recorder.report.page import PAGE_START, asset
+from ir_recorder.report.paid import Tile
 from ir_recorder.report.tables import check_table, table
 from ir_values.files import ANYWHERE, FileRoots
-
-_GRID = 0.01  # s: the meter's
 
 
 def write_robots(
@@ -139,10 +138,7 @@ def common_peak(analyses: Mapping[str, Analysis]) -> float:
     meters = [a.recording.power for a in analyses.values() if a.recording.power is not None]
     if not meters:
         return float("nan")
-    low = max(float(meter.time[0]) for meter in meters)
-    high = min(float(meter.time[-1]) for meter in meters)
-    grid = np.arange(low, high, _GRID)
-    total = sum((np.interp(grid, m.time, m.power) for m in meters), np.zeros(len(grid)))
+    _, total = together(meters)
     return float(total.max(initial=0.0))
 
 
@@ -156,7 +152,20 @@ def _whole(analyses: Mapping[str, Analysis]) -> Span:
 _KINDS = {
     "loaded": "robot moves; in a zone, the upper one of its two robots",
     "empty": "pause of the program; in a zone, the lower one",
+    "late": "both robots in a zone",
 }
+
+
+def _both_inside(passes: Mapping[str, Sequence[Span]]) -> list[Bar]:
+    """When two robots were in a zone together, which takes turns."""
+    (one, spans), (other, its_spans) = passes.items()
+    overlaps = (
+        Span(max(span.begin, its.begin), min(span.end, its.end))
+        for span in spans
+        for its in its_spans
+    )
+    words = f"{one} and {other} together"
+    return [("late", each, words) for each in overlaps if each.seconds > STAMPS]
 
 
 def _figure(analyses: Mapping[str, Analysis]) -> str:
@@ -170,10 +179,8 @@ def _figure(analyses: Mapping[str, Analysis]) -> str:
             chart.lane("mode", mode_bars(analysis.recording.power, span))
     for signal, passes in zone_passes(analyses).items():
         styles = zip(passes.items(), ("loaded", "empty"), strict=True)
-        chart.lane(
-            signal,
-            [(style, each, robot) for (robot, spans), style in styles for each in spans],
-        )
+        bars = [(style, each, robot) for (robot, spans), style in styles for each in spans]
+        chart.lane(signal, [*bars, *_both_inside(passes)])
     chart.power([a.recording.power for a in analyses.values() if a.recording.power is not None])
     drawn = chart.drawn("robots", "robots, zones and power")
     return f'{legend(_KINDS)}<figure class="figure">{drawn}</figure>'

@@ -43,6 +43,22 @@ def envelope(time: FloatArray, value: FloatArray, most: int) -> Envelope:
     return Envelope((first + last) / 2.0, low, high)
 
 
+def stretches(edges: FloatArray, time: FloatArray, value: FloatArray) -> Envelope:
+    """Lowest and highest value of a series (N,) between neighbours of rising `edges` (M + 1,),
+    straight between its readings; where it has none, its first or last.
+    """
+    inside = (time > edges[0]) & (time < edges[-1])
+    at = np.concatenate((edges, time[inside]))
+    order = np.argsort(at, kind="stable")
+    at = at[order]
+    known = np.interp(at, time, value)
+    first = np.flatnonzero(order < len(edges))
+    last = known[first[1:]]
+    low = np.minimum(np.minimum.reduceat(known[: first[-1] + 1], first[:-1]), last)
+    high = np.maximum(np.maximum.reduceat(known[: first[-1] + 1], first[:-1]), last)
+    return Envelope((edges[1:] + edges[:-1]) / 2.0, low, high)
+
+
 def floats(values: ArrayLike) -> str:
     """An array of any shape (...) as float32, little endian, in base64."""
     return _base64(np.asarray(values, dtype="<f4"))
@@ -90,7 +106,8 @@ _STEPS = 32_000  # of int16
 @dataclass(frozen=True, eq=False)
 class Curves:
     """One quantity: time (N,) s, value (N, n) in `unit`, limit (n, 2); series: what the columns
-    are.
+    are. low (N, n): the lowest values where `value` has the highest ones of stretches, which are
+    drawn as they are.
     """
 
     name: str
@@ -100,6 +117,7 @@ class Curves:
     limit: FloatArray | None = None
     shown: bool = True
     series: str = "axes"
+    low: FloatArray | None = None
 
 
 def axis_curves(analysis: Analysis) -> list[dict[str, Json]]:
@@ -162,7 +180,10 @@ def _readable(error: FloatArray) -> tuple[FloatArray, str]:
 def packed(curves: Curves) -> dict[str, Json]:
     """Curves as the page's scripts read them: peaks kept, int16."""
     value = np.nan_to_num(curves.value)
-    shape = envelope(curves.time, value, MOST)
+    if curves.low is None:
+        shape = envelope(curves.time, value, MOST)
+    else:
+        shape = Envelope(curves.time, np.nan_to_num(curves.low), value)
     step = max(float(np.abs(value).max()), 1e-9) / _STEPS
     packed: dict[str, Json] = {
         "name": curves.name,

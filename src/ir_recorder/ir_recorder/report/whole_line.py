@@ -107,18 +107,19 @@ def line_section(found: WholeLine | None, costs: Costs) -> str:
     origin = (
         "Shares as your file gives them."
         if own
-        else "Shares by Table I of the paper, of one production line; your own: line_robots and "
-        "the three after it in the file of costs."
+        else "Shares as they were measured on one production line; "
+        '<a href="#assumed">how to give those of your line</a>.'
     )
     word = "less" if found.line.gain()[0] == "saved" else "more"
     hint = (
         f"If every robot took {with_ends(found.robots)} {word}, the line would take "
         f"{with_ends(found.line)} {word}, and the factory with its hall {with_ends(found.factory)} "
-        f"{word}. Other consumers are taken to stay as they are. {origin}"
+        f"{word}. Other consumers are taken to stay as they are."
     )
     heads = ("consumer", ">today", ">as planned")
     return (
-        f'<section id="whole-line"><h2>Of the whole line</h2><p class="hint">{text(hint)}</p>'
+        '<section id="whole-line"><h2>Of the whole line</h2>'
+        f'<p class="hint">{text(hint)} {origin}</p>'
         f"{table(heads, rows, 'Of the whole line')}</section>"
     )
 

@@ -230,7 +230,7 @@ class TimeChart {
     for (const x of [middle - 3, middle + 3]) line(g, x - 3, bottom + 5, x + 3, bottom - 5);
     g.fillStyle = css("--ink");
     const words = seconds < 600 ? `${Math.round(seconds)} s` : `${Math.round(seconds / 60)} min`;
-    const shown = this.width < 520 ? words : `${words} rest`, half = g.measureText(shown).width / 2;
+    const shown = `${words} cut`, half = g.measureText(shown).width / 2;
     g.fillText(shown, Math.min(middle, this.width - half - 1), low);
   }
   valueAxis(g, low, high, unit, y) {
