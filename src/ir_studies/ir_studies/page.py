@@ -39,7 +39,7 @@ def settings_table(settings: Mapping[str, Any]) -> str:
     out.
     """
     rows = [
-        (f"<code>{text(name)}</code>", text(_words(value)))
+        (f"<code>{text(name).replace('_', '_<wbr>')}</code>", text(_words(value)))
         for name, value in settings.items()
         if value not in ("", (), [], {})
     ]

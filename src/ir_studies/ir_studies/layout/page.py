@@ -15,9 +15,20 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ir_description import Cell, cell_to_yaml
 from ir_planner.checks import JouleInterval
+from ir_recorder.analysis.production import Amount
 from ir_recorder.report.files import write_output
-from ir_recorder.report.number_text import DASH, joules, millimetres, percent, text
+from ir_recorder.report.number_text import (
+    DASH,
+    joules,
+    kilowatt_hours,
+    millimetres,
+    percent,
+    seconds,
+    span_of,
+    text,
+)
 from ir_recorder.report.page import PAGE_START
+from ir_recorder.report.paid import Tile, row_of
 from ir_recorder.report.shapes import body_mesh, capsule_mesh
 from ir_recorder.report.step_table import write_columns
 from ir_recorder.report.tables import table
@@ -167,7 +178,7 @@ _MOSTLY = 0.5  # of the corners of an outline
 _MACHINE = "equipment."  # before the name of an owner that is one
 _SENTENCE = 300  # characters of a reason
 _HEADS = (
-    "placement", "for", ">joules per cycle, 90 % interval", ">between seeds",
+    "placement", "for", ">energy of a cycle, 90 % interval", ">between seeds",
     ">less than given, 90 % interval", ">movements", ">duration", ">clearance",
 )  # fmt: skip
 
@@ -199,6 +210,7 @@ def page_html(
         "subtitle": text(
             f"{len(known)} placements, {len(settings.variables)} variables; energies are predicted"
         ),
+        "tiles": _tiles(known, finals),
         "verdict": f"<ul>{said}</ul>",
         "best": table(_HEADS, _rows(finals), "The best placements"),
         "map": "".join(_maps(known, finals, settings, cell)),
@@ -209,6 +221,43 @@ def page_html(
         "settings": settings_table(asdict(settings)),
     }
     return page("layout", parts)
+
+
+def _tiles(known: Sequence[Known], finals: Sequence[Sequence[Final]]) -> str:
+    """The best of the others against the given placement, under the first condition."""
+    given, best = ends(finals)
+    impossible = sum(one.cost == math.inf for one in known)
+    looked = Tile("placements", str(len(known)), (f"{impossible} of them impossible",))
+    if given is None or best is None:
+        return row_of([looked])
+    one = best[0]
+    like = of_condition(given, one)
+    less, within = one.saving(like)
+    word, gain = Amount(less, within.low, within.high).gain()
+    share = percent(gain.value / like.mean()).lstrip("+")
+    between = span_of(gain.low, gain.high, kilowatt_hours)
+    moving = 1.0 - one.mean("moving_j") / like.mean("moving_j")
+    moved = f"{percent(abs(moving)).lstrip('+')} {'less' if moving >= 0.0 else 'more'}"
+    saved = "saved a cycle by the best" if word == "saved" else "more a cycle by the best"
+    return row_of(
+        [
+            Tile(
+                saved, kilowatt_hours(gain.value), (share, f"90 % interval {between}", gain.doubt)
+            ),
+            Tile(
+                "energy of a cycle",
+                kilowatt_hours(one.mean()),
+                (f"as given {kilowatt_hours(like.mean())}", "at the mains, predicted"),
+            ),
+            Tile("movements alone", moved, ("than as given",)),
+            Tile(
+                "cycle time",
+                seconds(one.mean("duration_s")),
+                (f"as given {seconds(like.mean('duration_s'))}", one.condition.text),
+            ),
+            looked,
+        ]
+    )
 
 
 def _briefly(sentence: str, finals: Sequence[Sequence[Final]]) -> str:
@@ -247,17 +296,18 @@ def _rows(finals: Sequence[Sequence[Final]]) -> Iterator[tuple[str, ...]]:
                 like = of_condition(given, one)
                 saved, between = one.saving(like)
                 share = percent(saved / like.mean()).lstrip("+")
-                less = _with_interval(f"{joules(saved)} ({share})", between)
+                less = _with_interval(f"{kilowatt_hours(saved)} ({share})", between)
             yield (
-                name, text(one.condition.text), _with_interval(joules(one.mean()), one.interval),
-                joules(one.spread()), less, joules(one.mean("moving_j")),
-                f"{one.mean('duration_s'):.2f} s", millimetres(one.mean("clearance_m")),
+                name, text(one.condition.text),
+                _with_interval(kilowatt_hours(one.mean()), one.interval),
+                kilowatt_hours(one.spread()), less, kilowatt_hours(one.mean("moving_j")),
+                seconds(one.mean("duration_s")), millimetres(one.mean("clearance_m")),
             )  # fmt: skip
 
 
 def _with_interval(value: str, within: JouleInterval) -> str:
     """A value with its interval on a line of its own."""
-    return f"{value}<br><small>{joules(within.low)} … {joules(within.high)}</small>"
+    return f"{value}<br><small>{span_of(within.low, within.high, kilowatt_hours)}</small>"
 
 
 def _maps(

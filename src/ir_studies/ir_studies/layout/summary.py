@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_planner.checks import JouleInterval, interval
-from ir_recorder.report.number_text import joules, percent
+from ir_recorder.report.number_text import kilowatt_hours, percent, seconds, span_of
 from ir_studies.layout.placement import FIRST_SEED, Known, Placement
 from ir_studies.layout.search import BATCH, GIVEN, best_of
 from ir_studies.layout.settings import Condition, LayoutSettings
@@ -200,15 +200,15 @@ def of_condition(own: Sequence[Final], like: Final) -> Final:
 
 def words(best: Final, given: Final | None) -> str:
     """The best of the others under a condition, against the given one."""
-    within = best.interval
+    between = span_of(best.interval.low, best.interval.high, kilowatt_hours)
     worse = given is not None and best.mean("cost_j") > given.mean("cost_j")
     name = "Best of the others" if worse else "Best"
     said = (
-        f"{name} ({best.placement.key}; {best.condition.text}): {joules(best.mean())} at the "
-        f"mains per cycle, predicted, 90 % interval {joules(within.low)} to {joules(within.high)}"
+        f"{name} ({best.placement.key}; {best.condition.text}): {kilowatt_hours(best.mean())} at "
+        f"the mains per cycle, predicted, 90 % interval {between}"
     )
     if len(best.rows) > 1:
-        said += f", {joules(best.spread())} between {len(best.rows)} seeds"
+        said += f", {kilowatt_hours(best.spread())} between {len(best.rows)} seeds"
     return f"{said}." if given is None else f"{said}; {against(best, given)}"
 
 
@@ -217,14 +217,15 @@ def against(best: Final, given: Final) -> str:
     less, saved = best.saving(given)
     does, sign = ("saves", 1.0) if less >= 0.0 else ("takes more:", -1.0)
     low, high = sorted((sign * saved.low, sign * saved.high))
+    between = span_of(low, high, kilowatt_hours)
     sure = "" if low > 0.0 else "; zero lies in it: it is open whether anything is saved"
     moving = 1.0 - best.mean("moving_j") / given.mean("moving_j")
     change = f"{percent(abs(moving)).lstrip('+')} {'less' if moving >= 0.0 else 'more'}"
     return (
-        f"the given one {joules(given.mean())}. It {does} {joules(sign * less)}, "
-        f"{percent(sign * less / given.mean()).lstrip('+')} (90 % interval {joules(low)} to "
-        f"{joules(high)}{sure}); the movements alone take {change}. A cycle takes "
-        f"{best.mean('duration_s'):.2f} s instead of {given.mean('duration_s'):.2f} s."
+        f"the given one {kilowatt_hours(given.mean())}. It {does} {kilowatt_hours(sign * less)}, "
+        f"{percent(sign * less / given.mean()).lstrip('+')} (90 % interval {between}{sure}); the "
+        f"movements alone take {change}. A cycle takes {seconds(best.mean('duration_s'))} instead "
+        f"of {seconds(given.mean('duration_s'))}."
     )
 
 

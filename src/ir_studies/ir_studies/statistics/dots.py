@@ -13,7 +13,7 @@ from ir_studies.statistics.findings import Comparison
 
 WIDTH = 560.0
 LINE = 34.0
-_LEFT = 170.0
+_LEFT = 190.0
 _RIGHT = 20.0
 _TOP = 8.0
 _BOTTOM = 48.0
@@ -42,7 +42,7 @@ def dots(comparisons: Sequence[Comparison], title: str) -> str:
         'role="img" '
         f'aria-label="{text(title)}: '
         f'{text(said)}">{_axis(range(first, last + 1), step, height, at)}{lines}'
-        f'<text x="{(_LEFT + WIDTH - _RIGHT) / 2:g}" y="{height - 12:g}" text-anchor="middle">'
+        f'<text x="{WIDTH / 2:g}" y="{height - 12:g}" text-anchor="middle">'
         f"{text(title)}</text></svg></div>"
     )
 

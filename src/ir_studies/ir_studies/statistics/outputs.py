@@ -190,6 +190,8 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
             f"objective {settings.objective}, plant {settings.plant}"
         ),
         "counts": table(("", ">how many"), [(text(a), b) for a, b in counts(found)], "Counts"),
+        "verdict": "".join(f"<li>{text(one)}</li>" for one in _in_words(found)),
+        "bold": "" if any(each.shown for each in found.comparisons) else ": here none does",
         "notes": "".join(f"<li>{text(note)}</li>" for note in notes(found, settings)),
         "comparisons": _table(
             found.comparisons, "Asynchronous against synchronous", (">asynchronous", ">synchronous")
@@ -205,6 +207,28 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
         "settings": settings_table(settings.budget),
     }
     return page("statistics", parts)
+
+
+def _in_words(found: Findings) -> Iterator[str]:
+    """The results in sentences, the comparison of the timings first."""
+    shown = [each for each in found.comparisons if each.shown]
+    if not shown:
+        pairs = max((each.pairs for each in found.comparisons), default=0)
+        yield (
+            f"Of {pairs} pairs that differ no quantity is shown to be larger or smaller with "
+            "asynchronous joints."
+        )
+    for each in shown:
+        yield (
+            f"Asynchronous joints: {each.name} {percent(each.mean.value)} % in the mean "
+            f"({_interval(each.mean)}), of {each.pairs} pairs."
+        )
+    for each in found.agreements:
+        if math.isfinite(each.mean.value):
+            yield (
+                f"Energy {each.name}: {percent(each.mean.value)} % in the mean "
+                f"({_interval(each.mean)}), of {each.pairs} pairs."
+            )
 
 
 def summed_up(found: Findings) -> str:
