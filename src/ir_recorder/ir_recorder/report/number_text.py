@@ -18,6 +18,7 @@ LOCALES = (ENGLISH, "de")
 _MODES = re.compile(
     rf"\b(?:{'|'.join(mode.name for mode in Mode if '_' in mode.name)}|HIBERNATION)\b"
 )
+_NO_JOULES = 1e-3  # J
 _UNSEEN = ("Cc", "Cf", "Cs")  # categories of Unicode: control, format, surrogate
 
 
@@ -59,17 +60,21 @@ def kilowatt_hours(value: float) -> str:
     """
     if not math.isfinite(value):
         return DASH
-    if 0.0 < abs(value) < 36.0:
+    if _NO_JOULES <= abs(value) < 36.0:
         return f"{significant(value, 3)} J"
-    kwh = value / 3.6e6
+    kwh = value / 3.6e6 if abs(value) >= _NO_JOULES else 0.0
     if abs(kwh) < 0.01:
         return f"{significant(1e3 * kwh, 3)} Wh"
     return f"{_fixed(kwh, 0) if abs(kwh) >= 100.0 else significant(kwh, 3)} kWh"
 
 
 def watt_hours(value: float) -> str:
-    """Joules as Wh with three significant digits: for a column whose figures are far apart."""
-    return f"{significant(value / 3600.0, 3)} Wh" if math.isfinite(value) else DASH
+    """Joules as Wh with three significant digits: for a column whose figures are far apart; less
+    than a millijoule, which sums of many joules leave over, is 0.
+    """
+    if not math.isfinite(value):
+        return DASH
+    return f"{significant(value / 3600.0, 3) if abs(value) >= _NO_JOULES else 0} Wh"
 
 
 def kilograms(value: float) -> str:
