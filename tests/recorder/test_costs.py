@@ -158,7 +158,10 @@ def test_rest_outside_of_the_shifts_is_priced_by_mode(analysis: Analysis) -> Non
 
 
 def test_assumptions_are_marked_and_given_figures_are_not(analysis: Analysis) -> None:
-    for own in ((), ("price",), ("shift_hours", "currency"), NAMES):
+    alone = assumed_section(Costs(price=0.5))
+    assert "All values are assumed." in alone
+    assert "0.5 EUR/kWh" in alone
+    for own in (("price",), ("shift_hours", "currency"), NAMES):
         costs = replace(Costs(), price=0.5, given=own)
         origins = re.findall(
             r"<small>(\w+)</small></td><td[^>]*><b>([^<]*)</b><small>([^<]*)",
@@ -169,9 +172,9 @@ def test_assumptions_are_marked_and_given_figures_are_not(analysis: Analysis) ->
         assert marked == set(own)
         assert all(words == "assumed" for name, _, words in origins if name not in own)
         assert ("price", "0.5 EUR/kWh") in [row[:2] for row in origins]
-        words = "all assumed" if not own else "partly assumed"
-        words = "as your file gives it" if own == NAMES else words
+        words = "as your file gives it" if own == NAMES else "partly assumed"
         assert words in costs_section(analysis, costs)
+    assert "all assumed" in costs_section(analysis, Costs())
 
 
 def test_the_cycle_is_the_one_with_full_pauses(analysis: Analysis) -> None:

@@ -52,6 +52,9 @@ def test_in_a_pause_no_pair_is_the_nearest_as_in_a_report(heard: Heard) -> None:
     for kind, said in (("pause", False), ("regional", True)):
         near = view.look(replace(heard, movement=PlannedMovement(kind=kind)))["near"]
         assert (near is not None) is said
+    with_part = PlannedMovement(kind="regional", load="gripper+gear")
+    late = view.look(replace(heard, movement=with_part))["near"]
+    assert late == view.look(replace(heard, movement=with_part, load="gripper+gear"))["near"]
 
 
 def test_joints_in_another_order_are_put_right_and_strangers_show_nothing(heard: Heard) -> None:

@@ -170,16 +170,19 @@ class CellView:
 
     def _near(self, heard: Heard) -> Json:
         """Distance [m], the two points and the names of the nearest pair that isn't allowed to
-        touch; None in a pause, as in a report: what stands at a station may touch it.
+        touch, with the load of the movement that runs; None in a pause. Both as in a report: what
+        stands at a station may touch it, and the word of a new load may come late.
         """
         cell = self._cell
         q = self.in_order(heard.joints, heard.q)
         pausing = heard.movement is not None and heard.movement.is_pause
         if cell is None or q is None or pausing:
             return None
-        key = (self._version, heard.load, tuple(sorted(self._places.lying.items())))
+        own = heard.movement.load if heard.movement is not None else ""
+        load = own or heard.load
+        key = (self._version, load, tuple(sorted(self._places.lying.items())))
         if self._model is None or self._model[0] != key:
-            self._model = (key, collision_model(cell, heard.load, self._places))
+            self._model = (key, collision_model(cell, load, self._places))
         model = self._model[1]
         offset = np.zeros(len(model.pairs))
         if heard.movement is not None:

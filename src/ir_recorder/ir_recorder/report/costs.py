@@ -490,12 +490,19 @@ def counted_with(costs: Costs) -> str:
 
 
 def assumed_section(costs: Costs) -> str:
-    """All settings, those that no file gave named as assumed; it is unfolded on paper."""
+    """All settings, those that no file gave named as assumed, in a sentence where all are; it is
+    unfolded on paper.
+    """
+    own = set(NAMES) & set(costs.given)
     rows = [
         (
             f"{text(each.sentence)}<small>{each.name}</small>",
             f"<b>{text(_setting(costs, each.name))}</b>"
-            f"<small>{'from your file' if each.name in costs.given else 'assumed'}</small>",
+            + (
+                f"<small>{'from your file' if each.name in own else 'assumed'}</small>"
+                if own
+                else ""
+            ),
         )
         for each in SETTINGS
     ]
@@ -503,7 +510,8 @@ def assumed_section(costs: Costs) -> str:
         '<details class="part printed"><summary><h2>What the money rests on</h2></summary>'
         '<p class="hint" id="assumed">To change a value, write its name and your value as a line '
         f"of a file that begins with <code>format: {FORMAT}</code>, as <code>price: 0.31</code>, "
-        "and give the file with <code>--costs costs.yaml</code>.</p>"
+        "and give the file with <code>--costs costs.yaml</code>."
+        f"{'' if own else ' All values are assumed.'}</p>"
         f"{table(('what is counted', '>value'), rows, 'What the money rests on')}</details>"
     )
 
