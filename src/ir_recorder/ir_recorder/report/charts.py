@@ -366,11 +366,11 @@ def _grid(x: _Axis, y: _Axis, along: str) -> str:
     for value, shown in x.ticks().items():
         at = x.at(value)
         parts.append(f'<path class="grid" d="M{at:.1f} {_TOP:g}V{bottom:g}"/>')
-        parts.append(f'<text x="{at:.1f}" y="{bottom + 18:g}" text-anchor="middle">{shown}</text>')
+        parts.append(f'<text x="{at:.1f}" y="{bottom + 21:g}" text-anchor="middle">{shown}</text>')
     middle = (_LEFT + right) / 2.0
     return (
         "".join(parts)
-        + f'<text x="{middle:g}" y="{HEIGHT - 6:g}" text-anchor="middle">{along}</text>'
+        + f'<text x="{middle:g}" y="{HEIGHT - 4:g}" text-anchor="middle">{along}</text>'
     )
 
 

@@ -14,7 +14,7 @@ from ir_studies.statistics.findings import Comparison
 WIDTH = 560.0
 LINE = 34.0
 _LEFT = 190.0
-_RIGHT = 20.0
+_RIGHT = 30.0
 _TOP = 8.0
 _BOTTOM = 48.0
 _INSIDE = (2.0, 98.0)  # percentiles that the axis holds; dots outside are drawn at its edge
