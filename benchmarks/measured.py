@@ -187,7 +187,7 @@ def _strangers(count: int) -> tuple[list[dict[str, Any]], list[Claim], list[bool
         runs = [recorded(robot, seconds, run) for run, seconds in enumerate((100.0, 80.0))]
         estimate = Estimate(runs, ["first", "second"], model, prior)
         fit = result(estimate, "stranger")
-        alarms += bool(doubts(estimate, fit))
+        alarms += bool(doubts(estimate, fit).sentences)
         size = fit.parameters.value("dc_link")
         found = left_out(estimate)
         fitted, sheet, plain = (100.0 * median_error(found, method) for method in METHODS)
@@ -245,7 +245,7 @@ def _taken(run: Samples, model: PowerModel, prior: PowerParameters) -> bool:
         fit = result(estimate, "spoilt")
     except RecorderError:
         return False
-    said = recommendation(left_out(estimate), doubted=bool(doubts(estimate, fit)))
+    said = recommendation(left_out(estimate), doubted=bool(doubts(estimate, fit).sentences))
     return "plan with the fit" in said and "before you plan with the fit" not in said
 
 

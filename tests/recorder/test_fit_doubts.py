@@ -17,7 +17,7 @@ from ir_description import (
 )
 from ir_description.library import power_parameters_of
 from ir_recorder.errors import RecorderError
-from ir_recorder.fit import Estimate, doubts, fit, recommendation, result, undecided
+from ir_recorder.fit import Estimate, doubts, fit, recommendation, result
 from ir_recorder.measure import PowerModel, Samples
 
 ROBOT = load_robot("kr6_r900_2")
@@ -68,7 +68,7 @@ def doubted(samples: Samples) -> str:
         found = result(estimate, "x")
     except RecorderError as error:
         return str(error)
-    return " ".join(doubts(estimate, found))
+    return " ".join(doubts(estimate, found).sentences)
 
 
 def test_nothing_speaks_against_good_data() -> None:
@@ -140,7 +140,8 @@ def test_columns_of_a_wrist_that_are_exchanged_are_doubted_or_said_to_be_undecid
     model, prior = model_of(ROBOT)
     swapped = with_columns(drawn_meter(1), [0, 1, 2, 4, 3, 5], np.ones(6))
     estimate = Estimate([swapped], ["run"], model, prior)
-    said = " ".join((*doubts(estimate, result(estimate, "x")), *undecided(estimate)))
+    found = doubts(estimate, result(estimate, "x"))
+    said = " ".join((*found.sentences, *found.undecided))
     assert f"the columns of {ROBOT.joint_names[3]} and {ROBOT.joint_names[4]} swapped" in said
 
 

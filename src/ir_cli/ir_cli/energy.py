@@ -46,7 +46,6 @@ from ir_recorder.fit import (
     parameter_rows,
     recommendation,
     source_cell,
-    undecided,
     write_fit_picture,
 )
 from ir_recorder.fit import sentences as fit_sentences
@@ -308,12 +307,12 @@ def run_fit(arguments: argparse.Namespace) -> int:
         written.append(write_fit_picture(found, prior, arguments.picture))
     doubted = doubts(estimate, found)
     begun = "the data sheet" if prior.name == DATA_SHEET else prior.name
-    advised = recommendation(unseen, doubted=bool(doubted), begun=begun)
+    advised = recommendation(unseen, doubted=bool(doubted.sentences), begun=begun)
     said = (
         *data.notes,
         *fit_sentences(found, begun),
-        *undecided(estimate),
-        *doubted,
+        *doubted.undecided,
+        *doubted.sentences,
         advised,
     )
     rows = parameter_rows(found, prior)

@@ -2,7 +2,7 @@
 
 from ir_recorder.fit.channels import open_prior
 from ir_recorder.fit.data import BY, FitData, Source, fit_data, source_cell
-from ir_recorder.fit.doubts import doubts, fit_sources, result, undecided
+from ir_recorder.fit.doubts import doubts, fit_sources, result
 from ir_recorder.fit.estimate import Estimate, Fit, FittedMovement, fit
 from ir_recorder.fit.left_out import (
     LeftOut,
@@ -37,6 +37,5 @@ __all__ = [
     "sentences",
     "shaft_work",
     "source_cell",
-    "undecided",
     "write_fit_picture",
 ]

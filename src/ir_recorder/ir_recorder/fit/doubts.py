@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -39,7 +38,7 @@ def result(estimate: Estimate, name: str) -> Fit:
     try:
         return estimate.result(name)
     except RecorderError as error:
-        raise RecorderError(". ".join([str(error), *doubts(estimate)])) from error
+        raise RecorderError(". ".join([str(error), *doubts(estimate).sentences])) from error
 
 
 def fit_sources(
@@ -75,16 +74,29 @@ def fit_sources(
     return replace(data, notes=tuple(notes)), estimate, found
 
 
-def doubts(estimate: Estimate, found: Fit | None = None) -> tuple[str, ...]:
-    """Sentences on recordings whose power or torques the fit explains badly or by what can't be,
-    after `result`; found: that result. Each ends with what to look at.
+@dataclass(frozen=True)
+class Doubts:
+    """sentences: on recordings whose power or torques the fit explains badly or by what can't be;
+    each ends with what to look at. undecided: on columns of joints that the power does not tell
+    apart.
     """
+
+    sentences: tuple[str, ...]
+    undecided: tuple[str, ...] = ()
+
+
+def doubts(estimate: Estimate, found: Fit | None = None) -> Doubts:
+    """What speaks against a fit, after `result`; found: that result, None where it was refused."""
     said = list(_of_still_joints(estimate))
+    open_ones: tuple[str, ...] = ()
     if found is not None:
         said += _of_factors(estimate, found)
     if found is not None and estimate.meter is not None:
         said += _of_gains(estimate, found)
-        said += _of_columns(estimate)
+        columns = _columns(estimate)
+        if columns is not None:
+            said += _of_columns(columns)
+            open_ones = _undecided(columns)
     if estimate.meter is not None:
         fitted = estimate.meter.watts(estimate.found[: len(estimate.prior.names)])
         sheet = estimate.meter.watts(estimate.prior.mean)
@@ -92,7 +104,7 @@ def doubts(estimate: Estimate, found: Fit | None = None) -> tuple[str, ...]:
             said += _of_power(estimate, run, *both)
     if estimate.motors is not None:
         said += _of_torques(estimate)
-    return tuple(said)
+    return Doubts(tuple(said), open_ones)
 
 
 def _of_power(
@@ -253,11 +265,8 @@ class _Columns:
     changed: tuple[tuple[str, float], ...]
 
 
-def undecided(estimate: Estimate) -> tuple[str, ...]:
-    """A sentence on columns of joints that the power does not tell apart, after `result`."""
-    columns = _columns(estimate)
-    if columns is None:
-        return ()
+def _undecided(columns: _Columns) -> tuple[str, ...]:
+    """A sentence on columns of joints that the power does not tell apart."""
     alike = [
         what
         for what, left in columns.changed
@@ -272,13 +281,10 @@ def undecided(estimate: Estimate) -> tuple[str, ...]:
     )
 
 
-def _of_columns(estimate: Estimate) -> Iterator[str]:
+def _of_columns(columns: _Columns) -> Iterator[str]:
     """Two columns of joints that explain the power better the other way round, or one that does
     with its sign changed.
     """
-    columns = _columns(estimate)
-    if columns is None:
-        return
     what, left = min(columns.changed, key=lambda each: each[1])
     if left < columns.better:
         yield (
@@ -287,7 +293,6 @@ def _of_columns(estimate: Estimate) -> Iterator[str]:
         )
 
 
-@lru_cache(maxsize=1)  # of the estimate that was asked for last: doubts and what is undecided
 def _columns(estimate: Estimate) -> _Columns | None:
     """What other readings of the columns leave; None where there is too little to try them on."""
     if estimate.meter is None:
