@@ -95,9 +95,9 @@ from ir_planner.trajectories import (
     OptimizationPlan,
     Reference,
     Via,
+    ViaSearch,
     optimize_trajectory,
     plan_through,
-    plan_via,
 )
 from ir_planner.waiting_postures import standby_at
 from ir_values.argument_types import typed_methods
@@ -400,8 +400,8 @@ class Planner:
                 asked = Context.of(scene, options, self._work(options, cancelled))
                 return asked.leaning_by(_tilt_to(end, scene))
 
-            plan = plan_via(begin, places, end, fresh(), fresh, searches)
-            return self._kept(plan, scene, note)
+            search = ViaSearch(begin, places, end, fresh(), fresh, searches)
+            return self._kept(search.plan(), scene, note)
         context = context.in_motion(motion)
         return self._kept(plan_to_goal(begin, end, context, searches), scene, note)
 

@@ -21,7 +21,7 @@ from ir_planner.regional import Searches, search_regional
 from ir_planner.request import Context, Goal, Journal, Work, parse_goal
 from ir_planner.service import timed_service
 from ir_planner.timing import Movement, best_stretch, stretched
-from ir_planner.trajectories import Via, search_via
+from ir_planner.trajectories import Via, ViaSearch
 from ir_values.arrays import FloatArray
 
 # Movements that are known, made again for another value of a second: near the path of one, from
@@ -318,7 +318,7 @@ class Movements:
         asked = Via(places, via.tolerance, via.distance)
         goal = Goal(configuration=second)
         try:
-            return search_via(first, asked, goal, context, leg, self.searches)
+            return ViaSearch(first, asked, goal, context, leg, self.searches).search()
         except RequestError as error:  # none of what was found is certified
             return error.status, None
 

@@ -97,42 +97,10 @@ def _near(
     return np.asarray((away <= via.distance) & (chord <= most))
 
 
-def plan_via(
-    start: FloatArray,
-    via: Via,
-    goal: Goal,
-    context: Context,
-    leg_context: Callable[[], Context],
-    searches: Searches,
-) -> MovementPlan:
+class ViaSearch:
     """Movement from start (n,) past all places to a goal. leg_context: of a leg, with work of its
     own. Raises RequestError, CancelledError when asked to stop.
     """
-    journal = context.journal
-    journal.planner_id = "via"
-    journal.timing = "synchronous"
-    passing = _Passing(start, via, goal, context, leg_context, searches)
-    status, found = passing.search()
-    info = journal.info(passing.start, context.joint_names)
-    if found is None:
-        return MovementPlan(status, info, TrajectoryReport())
-    return MovementPlan(status, info, found.report, found.trajectory, found.path)
-
-
-def search_via(
-    start: FloatArray,
-    via: Via,
-    goal: Goal,
-    context: Context,
-    leg_context: Callable[[], Context],
-    searches: Searches,
-) -> tuple[Status, Movement | None]:
-    """The same as a movement, None where the status says why there is none."""
-    return _Passing(start, via, goal, context, leg_context, searches).search()
-
-
-class _Passing:
-    """One request."""
 
     def __init__(
         self,
@@ -151,6 +119,17 @@ class _Passing:
         self.goal = goal
         self.leg_context = leg_context
         self.searches = searches
+
+    def plan(self) -> MovementPlan:
+        """What `search` finds, as an answer."""
+        journal = self.context.journal
+        journal.planner_id = "via"
+        journal.timing = "synchronous"
+        status, found = self.search()
+        info = journal.info(self.start, self.context.joint_names)
+        if found is None:
+            return MovementPlan(status, info, TrajectoryReport())
+        return MovementPlan(status, info, found.report, found.trajectory, found.path)
 
     def search(self) -> tuple[Status, Movement | None]:
         """The cheapest movement that is found, None where the status says why there is none."""
