@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from shape_msgs.msg import SolidPrimitive
 
 from ir_description import Body, Cell, Equipment
 from ir_description.cell import zone_around
@@ -18,7 +19,13 @@ from ir_msgs_py.names import BASE_FRAME, WORLD_FRAME
 from ir_msgs_py.ros.conversions import pose_from_msg
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
-from ir_planner.node.moveit_view import MoveItShape, allowed_here, allowed_in, objects_of
+from ir_planner.node.moveit_view import (
+    PRIMITIVES,
+    MoveItShape,
+    allowed_here,
+    allowed_in,
+    objects_of,
+)
 from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError, PoseError, shown
 
@@ -26,11 +33,7 @@ OBJECTS_MAX = 1000
 TRIANGLES_MAX = 200_000
 """Of one mesh."""
 _ADD, _REMOVE, _APPEND, _MOVE = range(4)
-_BOX = 1
-_SPHERE = 2
-_CYLINDER = 3
-_PRIMITIVES = {_BOX: ("box", 3), _SPHERE: ("sphere", 1), _CYLINDER: ("cylinder", 2)}
-_OTHERS = {4: "a cone", 5: "a prism"}
+_OTHERS = {SolidPrimitive.CONE: "a cone", SolidPrimitive.PRISM: "a prism"}
 _CODE = StatusCode.INVALID_OBJECT_NAME
 
 
@@ -155,7 +158,7 @@ def _repeats(msg: Any, published: Sequence[MoveItShape], cell: Cell) -> bool:
         return False
     what = f"collision object {shown(str(msg.id))}"
     at = composed(frame_pose(msg.header.frame_id, cell, what), pose_in(msg.pose, what))
-    kinds = {number: word for number, (word, _) in _PRIMITIVES.items()}
+    kinds = {number: word for number, (word, _) in PRIMITIVES.items()}
     given = [
         MoveItShape(
             kinds.get(int(shape.type), ""), composed(at, pose_in(place, what)), shape.dimensions
@@ -257,14 +260,14 @@ def _bodies(msg: Any, name: str, taken: int, notes: list[str]) -> list[Body]:
 
 def _primitive(msg: Any, pose: FloatArray, name: str, what: str) -> Body:
     kind = int(msg.type)
-    if kind not in _PRIMITIVES:
+    if kind not in PRIMITIVES:
         shape = _OTHERS.get(kind, f"shape {kind}")
         raise refusal(what, f"{shape} can't be taken; boxes, spheres, cylinders and meshes can")
-    word, count = _PRIMITIVES[kind]
+    word, count = PRIMITIVES[kind]
     given = [float(value) for value in msg.dimensions]
     if len(given) != count:
         raise refusal(what, f"a {word} has {count} dimensions, it has {len(given)}")
-    if kind == _CYLINDER:  # height and radius there, radius and length here
+    if kind == SolidPrimitive.CYLINDER:  # height and radius there, radius and length here
         given.reverse()
     size = np.zeros(3)
     size[:count] = given

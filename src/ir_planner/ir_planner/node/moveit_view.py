@@ -24,11 +24,14 @@ TIP = "tcp"
 FLOOR = "floor"
 _FLOOR_EDGE = 20.0  # m of the slab that stands for a plane, which RViz does not draw
 _FLOOR_THICK = 0.1  # m
-_PRIMITIVES = {
-    "box": SolidPrimitive.BOX,
-    "sphere": SolidPrimitive.SPHERE,
-    "cylinder": SolidPrimitive.CYLINDER,
+PRIMITIVES = {
+    SolidPrimitive.BOX: ("box", 3),
+    SolidPrimitive.SPHERE: ("sphere", 1),
+    SolidPrimitive.CYLINDER: ("cylinder", 2),
 }
+"""Solid primitives that a cell can hold, by their number: what it calls them, how many dimensions
+they have."""
+_NUMBERS = {word: number for number, (word, _) in PRIMITIVES.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,7 +221,7 @@ def _object(msgs: Any, name: str, pieces: Iterable[MoveItShape]) -> Any:
             made.meshes.append(_mesh(piece.corners))
             made.mesh_poses.append(place)
         else:
-            kind = _PRIMITIVES[piece.kind]
+            kind = _NUMBERS[piece.kind]
             made.primitives.append(SolidPrimitive(type=kind, dimensions=list(piece.dimensions)))
             made.primitive_poses.append(place)
     return made
