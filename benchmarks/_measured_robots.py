@@ -39,7 +39,8 @@ def _turn(axis: int, angle: float) -> FloatArray:
     turn = np.eye(4)
     a = (axis + 1) % 3
     b = (axis + 2) % 3
-    turn[a, a] = turn[b, b] = np.cos(angle)
+    turn[a, a] = np.cos(angle)
+    turn[b, b] = turn[a, a]
     turn[b, a] = np.sin(angle)
     turn[a, b] = -turn[b, a]
     return turn

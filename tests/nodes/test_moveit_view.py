@@ -104,7 +104,8 @@ def test_the_matrix_of_links_sent_back_with_another_pair_is_refused() -> None:
     k, j = next(
         (k, j) for k in range(len(rows)) for j in range(len(rows)) if not rows[k].enabled[j]
     )
-    rows[k].enabled[j] = rows[j].enabled[k] = True
+    rows[k].enabled[j] = True
+    rows[j].enabled[k] = True
     with pytest.raises(RequestError, match="allowed_collision_matrix of the scene"):
         applied(scene, CELLS["demo"], ())
 

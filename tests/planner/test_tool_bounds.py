@@ -41,7 +41,8 @@ def judged(
     joint = cell.robot.n
     motion = trajectory.sample(np.linspace(0.0, trajectory.duration, samples))
     places = np.array(points or [cell.tcp[:3, 3]])
-    speed = gain = 0.0
+    speed = 0.0
+    gain = 0.0
     for q, qd, qdd in zip(motion.q, motion.qd, motion.qdd, strict=True):
         pinocchio.forwardKinematics(model, data, q, qd, qdd)
         v = pinocchio.getVelocity(model, data, joint, pinocchio.ReferenceFrame.LOCAL)
