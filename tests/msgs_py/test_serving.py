@@ -15,7 +15,7 @@ from rclpy.task import Future
 from ir_msgs.action import RunProgram
 from ir_msgs.srv import SetPlcInput
 from ir_msgs_py.ros.rclpy_inside import SENDS, UNDISCOVERED, PatientSender
-from ir_msgs_py.ros.serving import BoundedService, RecordedActionServer
+from ir_msgs_py.ros.serving import LOOK, BoundedService, RecordedActionServer, gone
 from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.ros.topics import SERVICE
@@ -65,6 +65,28 @@ def test_every_request_of_a_burst_is_answered_in_its_order_or_refused(
     assert seen == [str(k) for k, good in enumerate(served) if good]
     assert MOST <= sum(served) < SENT
     assert said == {f"{MOST} requests of /bounded/ask are waiting: send fewer at once"}
+
+
+@pytest.mark.parametrize(
+    ("there", "gone_from"), [((1, 1, 0, 1), 2), ((0, 0, 1, 0), 3), ((0, 0, 0, 0), 9), ((1,) * 4, 9)]
+)
+def test_a_client_has_gone_once_it_was_seen_and_is_no_more(
+    there: tuple[int, ...], gone_from: int
+) -> None:
+    """Looked at when its request comes, and every LOOK then; it does not come back."""
+    looks: list[int] = []
+    now = [0.0]
+
+    def look() -> bool:
+        looks.append(there[len(looks)])
+        return bool(looks[-1])
+
+    left = gone(look, lambda: now[0])
+    for k in range(1, len(there)):
+        assert left() == (k > gone_from)  # not looked at yet
+        now[0] += 1.01 * LOOK
+        assert left() == (k >= gone_from)
+    assert len(looks) == min(len(there), gone_from + 1)
 
 
 class Middleware:

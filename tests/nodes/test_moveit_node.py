@@ -5,12 +5,15 @@ not installed.
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
+from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import Point, Pose
+from rclpy.action import ActionClient
 from rclpy.executors import MultiThreadedExecutor
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Float64
@@ -19,6 +22,7 @@ from ir_msgs.msg import Status, TrajectoryReport
 from ir_msgs_py.ros.conversions import pose_to_msg
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.ros.topics import LATCHED
+from ir_planner.errors import CancelledError
 
 moveit = pytest.importorskip("moveit_msgs.msg", reason="moveit_msgs is missing")
 services = pytest.importorskip("moveit_msgs.srv", reason="moveit_msgs is missing")
@@ -106,6 +110,47 @@ def crate(x: float, y: float, z: float, size: float = 0.3) -> Any:
         primitives=[SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[size] * 3)],
         primitive_poses=[Pose()],
     )
+
+
+def test_a_goal_that_is_canceled_while_it_is_planned_ends_its_plan_and_at_once(
+    adapter: Any,
+    planner_node: Any,
+    ros_node: Any,
+    ros_executor: Any,
+    wait_for: Any,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The plan would take as long as the test has patience."""
+    actions = pytest.importorskip("moveit_msgs.action")
+    begun = threading.Event()
+    ended: list[float] = []
+
+    def endless(*, cancelled: Any, **asked: Any) -> Any:
+        begun.set()
+        wait_for(cancelled, what="the plan is cancelled")
+        ended.append(time.monotonic())
+        raise CancelledError("stopped on request")
+
+    monkeypatch.setattr(planner_node.planner, "plan_regional", endless)
+    client = ros_executor.run(lambda: ActionClient(ros_node, actions.MoveGroup, "/move_action"))
+    wait_for(client.server_is_ready, what="the action is offered")
+    goal = actions.MoveGroup.Goal(request=plan_request().motion_plan_request)
+    goal.planning_options.plan_only = True
+    sent = ros_executor.run(lambda: client.send_goal_async(goal))
+    wait_for(sent.done, what="the goal is taken")
+    answer = ros_executor.run(sent.result().get_result_async)
+    wait_for(begun.is_set, what="it is planned")
+    asked = time.monotonic()
+    ros_executor.run(sent.result().cancel_goal_async)
+    wait_for(answer.done, what="the goal ends")
+    took = time.monotonic() - asked
+    wait_for(lambda: ended, what="the plan ends")
+    print(
+        f"answered {took:.3f} s after the cancel, its plan ended {ended[0] - asked:.3f} s after it"
+    )
+    assert answer.result().status == GoalStatus.STATUS_CANCELED
+    assert answer.result().result.error_code.val == Codes.PREEMPTED
+    ros_executor.run(client.destroy)
 
 
 def scene(*objects: Any) -> Any:

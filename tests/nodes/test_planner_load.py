@@ -7,6 +7,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -17,11 +18,14 @@ from sensor_msgs.msg import JointState
 from ir_description import Cell
 from ir_msgs.action import Plan
 from ir_msgs.msg import PlanOptions, Status
-from ir_msgs.srv import CheckState, SetCell
+from ir_msgs.srv import CheckState, PlanRegionalMovement, SetCell
+from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.ros.topics import ACTION_SERVICES, REQUESTS_WAITING, SERVICE
+from ir_planner.errors import CancelledError
 from ir_planner.node import node as planner_module
 from ir_planner.node.node import PlannerNode
+from ir_values.errors import CallGivenUpError
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 STATE = JointState(name=[f"joint_a{k}" for k in range(1, 7)], position=list(HOME))
@@ -95,6 +99,48 @@ def test_a_plan_that_waits_is_cancelled_at_once(
     others = [ros_executor.run(goal.get_result_async) for goal in (first, *_)]
     wait_for(lambda: all(future.done() for future in others), what="the others end")
     assert {future.result().result.status.code for future in others} == {Status.SUCCESS}
+
+
+def test_a_plan_that_its_client_gave_up_ends_and_nobody_elses(
+    planner_node: PlannerNode,
+    call: Callable[..., Any],
+    monkeypatch: pytest.MonkeyPatch,
+    ros_context: Any,
+    wait_for: Any,
+) -> None:
+    """It would be planned for as long as the test has patience, and hold up the next."""
+    begun: list[str] = []
+    ended: list[str] = []
+    plan = planner_node.planner.plan_regional
+    given_up = threading.Event()
+
+    def endless(*, goal: Any, cancelled: Callable[[], bool], **asked: Any) -> Any:
+        begun.append(goal.text)
+        if goal.text == "park":
+            wait_for(cancelled, what="its client is gone")
+            ended.append(goal.text)
+            raise CancelledError("stopped on request")
+        return plan(goal=goal, cancelled=cancelled, **asked)
+
+    def ask() -> Any:
+        with Client(context=ros_context, node_name="impatient") as client:
+            name = "ir_planner/plan_regional_movement"
+            request = PlanRegionalMovement.Request(goal="park", start=STATE)
+            return client.call(name, request, PATIENCE, given_up.is_set)
+
+    monkeypatch.setattr(planner_node.planner, "plan_regional", endless)
+    with ThreadPoolExecutor() as pool:
+        first = pool.submit(ask)
+        wait_for(lambda: begun or first.done(), what="it is planned")
+        assert not first.done(), first.result()
+        other = pool.submit(
+            call, PlanRegionalMovement, "plan_regional_movement", goal="home", start=STATE
+        )
+        assert not ended
+        given_up.set()
+        assert isinstance(first.exception(PATIENCE), CallGivenUpError)
+        assert other.result(PATIENCE).status.code == Status.SUCCESS
+    assert ended == ["park"]
 
 
 def test_more_plans_than_may_wait_are_refused_in_words(

@@ -250,8 +250,21 @@ def test_plan_execute_plan_and_execute_and_stop(panel: Panel) -> None:
 
     panel.wait_for(told, what="the monitored scene says so")
 
-    # plan and execute: the start state of the panel is not the robot's, and does not count
-    status, moved = panel.send(panel.move, move_goal(begin, plan_only=False, start=begin))
+    # what would begin elsewhere is not executed: neither planned from where the robot is not, nor
+    # driven from there
+    deviates = f"joint_a1 at {begin['joint_a1']:.4f} rad and the robot is at"
+    status, refused = panel.send(panel.move, move_goal(begin, plan_only=False, start=begin))
+    assert status == GoalStatus.STATUS_ABORTED
+    assert refused.error_code.val == Codes.START_STATE_INVALID
+    assert f"start_state has {deviates}" in refused.error_code.message
+    assert "within 0.01 rad" in refused.error_code.message
+    status, refused = panel.send(panel.drive, plan)
+    assert status == GoalStatus.STATUS_ABORTED
+    assert refused.error_code.val == Codes.INVALID_MOTION_PLAN
+    assert f"the first point has {deviates}" in refused.error_code.message
+
+    # plan and execute
+    status, moved = panel.send(panel.move, move_goal(begin, plan_only=False, start=there))
     assert status == GoalStatus.STATUS_SUCCEEDED, moved.error_code.message
     panel.wait_for(lambda: apart(panel.joints(), begin) < NEAR, what="the robot is back")
 
@@ -275,6 +288,19 @@ def test_plan_execute_plan_and_execute_and_stop(panel: Panel) -> None:
 def test_a_goal_that_is_canceled_and_one_that_makes_no_sense_end_as_such(panel: Panel) -> None:
     panel.wait_for(lambda: panel.states, what="joint_states come")
     begin = panel.joints()
+    # two goals at once are carried out one after the other, in the order in which they came
+    both = [move_goal(turned(begin, k * TURN), plan_only=False, start=None) for k in (0.5, 0.0)]
+    sent = [panel.executor.run(lambda goal=goal: panel.move.send_goal_async(goal)) for goal in both]
+    panel.wait_for(lambda: all(each.done() for each in sent), what="both are taken")
+    ends = [panel.executor.run(each.result().get_result_async) for each in sent]
+    panel.wait_for(ends[1].done, what="the second ends")
+    assert ends[0].done()
+    results = [each.result().result for each in ends]
+    assert [each.error_code.val for each in results] == [Codes.SUCCESS] * 2
+    first, second = (each.planned_trajectory.joint_trajectory.points for each in results)
+    assert np.abs(np.subtract(first[-1].positions, second[0].positions)).max() < NEAR
+    panel.wait_for(lambda: apart(panel.joints(), begin) < NEAR, what="the robot is back")
+
     bad = move_goal(turned(begin, TURN), plan_only=True, start=begin)
     bad.request.group_name = "arm_2"
     status, refused = panel.send(panel.move, bad)

@@ -515,6 +515,7 @@ class Planner:
         start: FloatArray | None = None,
         t1: bool = False,
         options: PlanOptions | None = None,
+        cancelled: Cancelled = _NEVER,
         **changes: Unpack[OptionFields],
     ) -> CartesianPlan:
         """The tool along a path, or along the one of the cell with this name, from `start` (n,),
@@ -524,7 +525,7 @@ class Planner:
         scene = self.scene(options.load)
         given = scene.cell.path(path) if isinstance(path, str) else path
         name, segments = (given.name, given.path) if isinstance(given, CellPath) else ("", given)
-        context = Context.of(scene, options, self._work(options, _NEVER), name)
+        context = Context.of(scene, options, self._work(options, cancelled), name)
         return self._kept(plan_path(segments, start, t1, context), scene, note)
 
     def optimize_trajectory(

@@ -18,6 +18,7 @@
     └── ClientError
         ├── ServiceUnavailableError        no node offers it
         ├── CallTimedOutError              offered, but no answer in time
+        ├── CallGivenUpError               whoever asked does not want the answer any more
         └── RequestRefusedError            answered with a status that is not SUCCESS; carries it
 
 A class exists where somebody catches it differently from its neighbours.
@@ -84,6 +85,10 @@ class ServiceUnavailableError(ClientError):
 
 class CallTimedOutError(ClientError):
     """The node is there but did not answer in time."""
+
+
+class CallGivenUpError(ClientError):
+    """The caller gave the call up before it was answered."""
 
 
 class RequestRefusedError(ClientError):

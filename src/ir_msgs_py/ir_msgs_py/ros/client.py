@@ -58,7 +58,12 @@ from ir_msgs_py.savings import ProgramPoint, ProgramSavings
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_values.arrays import FloatArray
-from ir_values.errors import CallTimedOutError, RequestRefusedError, ServiceUnavailableError
+from ir_values.errors import (
+    CallGivenUpError,
+    CallTimedOutError,
+    RequestRefusedError,
+    ServiceUnavailableError,
+)
 
 _DEPTH = 100
 _OWN = "ir_msgs/"
@@ -398,25 +403,57 @@ class Client:
     def __exit__(self, *exception: object) -> None:
         self.close()
 
-    def call(self, service: str, request: Any, timeout: float | None = None) -> Any:
+    def call(
+        self,
+        service: str,
+        request: Any,
+        timeout: float | None = None,
+        give_up: Callable[[], bool] | None = None,
+    ) -> Any:
         """Send a request (a `SetCell.Request(...)`) and return the response.
+
+        give_up: asked meanwhile; when it is true, CallGivenUpError is raised, and a planner ends
+        what it plans for the call.
 
         Raises ServiceUnavailableError or CallTimedOutError; the response's status is the caller's
         to read.
         """
         limit = self.timeout if timeout is None else timeout
         service_type = owner_of(request, "Request", "srv")
-        client = self._executor.run(lambda: self._client(service, service_type))
+        if give_up is None:
+            client = self._executor.run(lambda: self._client(service, service_type))
+            return self._called(client, service, request, limit)
+        own = self._executor.run(  # that it goes ends this call, and no other
+            lambda: self.node.create_client(service_type, service, qos_profile=SERVICE)
+        )
+        try:
+            return self._called(own, service, request, limit, give_up)
+        finally:
+            self._executor.run(lambda: self.node.destroy_client(own))
+
+    def _called(
+        self,
+        client: Any,
+        service: str,
+        request: Any,
+        limit: float,
+        give_up: Callable[[], bool] | None = None,
+    ) -> Any:
+        """The response to a request of this client, within `limit` [s] in all."""
         deadline = time.monotonic() + limit
         if not self._executor.wait_until(client.service_is_ready, limit):
-            other = self.graph.other_type(service, service_type)
+            other = self.graph.other_type(service, client.srv_type)
             raise ServiceUnavailableError(
                 f"no node offers the service {service} (waited {limit:g} s){other}"
             )
         future: Future = self._executor.run(lambda: client.call_async(request))
-        if not self._executor.wait(future, max(0.0, deadline - time.monotonic())):
-            self._executor.run(lambda: client.remove_pending_request(future))
-            raise CallTimedOutError(f"{service} did not answer within {limit:g} s")
+        look = float("inf") if give_up is None else LOOK
+        while not self._executor.wait(future, min(look, max(0.0, deadline - time.monotonic()))):
+            if give_up is not None and give_up():
+                raise CallGivenUpError(f"the call of {service} was given up")
+            if time.monotonic() >= deadline:
+                self._executor.run(lambda: client.remove_pending_request(future))
+                raise CallTimedOutError(f"{service} did not answer within {limit:g} s")
         return future.result()
 
     def ask(self, service: str, request: Any, timeout: float | None = None) -> Any:

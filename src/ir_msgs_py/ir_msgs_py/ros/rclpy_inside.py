@@ -220,6 +220,18 @@ def client_of(header: Any) -> str:
     return bytes(found.writer).hex() if same else ""
 
 
+def readers(node: Node, topic: str) -> set[str]:
+    """Identities of the endpoints that hear a topic of DDS, "rr/name/of/serviceReply" where a
+    service's clients hear its answers: those that `client_of` tells. None of a node that is being
+    destroyed.
+    """
+    try:
+        found = node.get_subscriptions_info_by_topic(topic, no_mangle=True)
+    except InvalidHandle:
+        return set()
+    return {bytes(each.endpoint_gid).hex() for each in found}
+
+
 def forget_request(goal: Any) -> None:
     """Drop what a goal asked for: rclpy keeps it as long as the result, a quarter of an hour.
 

@@ -9,6 +9,7 @@ beyond with a sentence, and answers one. What is raised meanwhile (no descriptor
 from __future__ import annotations
 
 import array
+import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterable
@@ -30,8 +31,10 @@ from ir_msgs_py.ros.messages import type_name
 from ir_msgs_py.ros.rclpy_inside import (
     PatientActionServer,
     can_take_requests,
+    client_of,
     forget_request,
     patient_sender,
+    readers,
     send_to_whoever_is_left,
     take_request,
 )
@@ -43,6 +46,8 @@ MOST_BYTES = 2 * 2**20
 recorder that is busy is at most WAITING of these twice.
 """
 WAITING = 100
+LOOK = 0.05
+"""s between two looks whether a client is still there: each takes a third of a millisecond."""
 _NUMBER = 8  # bytes; what a number takes at most
 
 
@@ -155,7 +160,8 @@ def unexpected(error: BaseException) -> Status:
     return Status(StatusCode.FAILURE, f"unexpected {type(error).__name__}: {error}")
 
 
-Handler = Callable[[Any, Any], Any]
+Handler = Callable[..., Any]
+Gone = Callable[[], bool]
 
 
 def with_status(response: Any, status: Status) -> None:
@@ -169,8 +175,9 @@ class BoundedService(Waitable):
     put: puts a status into a response, where that has no `status` of ours.
     handler: from request and response to the response; requests are answered in the order in which
     they came. What it raises, and a response that can't be sent, is answered as a failure and
-    logged; a client that has gone is a warning. Where rclpy's insides are missing, it is a service
-    as rclpy has it: the middleware's queue is the only one.
+    logged; a client that has gone is a warning. watching: it also takes whether its client has
+    gone. Where rclpy's insides are missing, it is a service as rclpy has it: the middleware's queue
+    is the only one, and nobody is watched.
     """
 
     def __init__(
@@ -182,8 +189,12 @@ class BoundedService(Waitable):
         group: CallbackGroup | None = None,
         waiting: int = REQUESTS_WAITING,
         put: Callable[[Any, Status], None] = with_status,
+        *,
+        watching: bool = False,
     ) -> None:
         super().__init__(group or node.default_callback_group)
+        self._node = node
+        self._watching = watching
         self._type = service_type
         self._handler = handler
         self._put = put
@@ -205,7 +216,7 @@ class BoundedService(Waitable):
             return
         self._calls.services.add(self._service)
         self._more = node.create_guard_condition(_nothing, callback_group=untouched)
-        self._waiting: deque[tuple[Any, Any]] = deque()
+        self._waiting: deque[tuple[Any, Any, tuple[Gone, ...]]] = deque()
         self._index = 0
         node.add_waitable(self)
 
@@ -232,29 +243,36 @@ class BoundedService(Waitable):
         """Whether a request has come or waits."""
         return bool(self._waiting) or bool(wait_set.is_ready("service", self._index))
 
-    def take_data(self) -> tuple[Any, Any] | None:
+    def take_data(self) -> tuple[Any, Any, tuple[Gone, ...]] | None:
         """Take all that have come; the one to be answered now."""
         while True:
             taken = take_request(self._service)
             if taken is None:
                 return self._waiting.popleft() if self._waiting else None
             if len(self._waiting) < self._most:
-                self._waiting.append(taken)
+                watch = (self._gone(taken[1]),) if self._watching else ()
+                self._waiting.append((*taken, watch))
             else:
                 self._refuse(taken[1])
 
-    async def execute(self, taken_data: tuple[Any, Any] | None) -> None:
+    async def execute(self, taken_data: tuple[Any, Any, tuple[Gone, ...]] | None) -> None:
         """Answer it."""
         if taken_data is None:
             return
-        request, header = taken_data
-        self._send(self._answer(request, self._type.Response()), header)
+        request, header, watch = taken_data
+        self._send(self._answer(request, self._type.Response(), *watch), header)
 
-    def _answer(self, request: Any, response: Any) -> Any:
+    def _gone(self, header: Any) -> Gone:
+        """Whether the client of a request has gone."""
+        client = client_of(header)
+        topic = f"rr{self._service.service_name}Reply"
+        return gone(lambda: client in readers(self._node, topic))
+
+    def _answer(self, request: Any, response: Any, *watch: Gone) -> Any:
         """The handler's response, or that of what it raises."""
         try:
             answered = self._calls.taken(self._service.service_name, type_name(self._type), request)
-            response = self._handler(request, response)
+            response = self._handler(request, response, *watch)
             answered(response)
         except ANY as error:
             self._log(traceback.format_exc())
@@ -313,6 +331,29 @@ class RecordedActionServer(PatientActionServer):
             return result
 
         return execute
+
+
+def gone(there: Callable[[], bool], clock: Callable[[], float] = time.monotonic) -> Gone:
+    """Whether a client that was `there` is no more, looked at now and then every LOOK [s] at most;
+    one that was never seen, since the middleware does not tell or has not discovered it yet, has
+    not gone.
+    """
+    seen = there()
+    left = False
+    next_look = clock() + LOOK
+
+    def look() -> bool:
+        nonlocal seen, left, next_look
+        now = clock()
+        if left or now < next_look:
+            return left
+        next_look = now + LOOK
+        here = there()
+        left = seen and not here
+        seen = seen or here
+        return left
+
+    return look
 
 
 def _nothing() -> None:

@@ -50,6 +50,7 @@ from ir_planner.node.inputs import LastState, has_joints, measured_velocity, of_
 from ir_planner.node.moveit_actions import (
     EXECUTE,
     MOVE,
+    Canceled,
     MoveAction,
     TrajectoryExecution,
     other_controller,
@@ -60,6 +61,7 @@ from ir_planner.node.moveit_requests import (
     MoveItSettings,
     check_free,
     check_group,
+    check_near,
     ik_pose,
     ik_request,
     largest_jump,
@@ -88,14 +90,15 @@ _ROBOT_LINK, _WORLD_OBJECT, _ATTACHED = range(3)  # of moveit_msgs/ContactInform
 class PlannerAnswers:
     """MoveIt's requests answered by the planner; messages are read and written by their fields.
 
-    ask: calls a service of the planner: name, request, timeout [s]. state: the joints (n,) where
+    ask: calls a service of the planner: name, request, timeout [s], and where it may be canceled
+    whether it is; CallGivenUpError ends it then. state: the joints (n,) where
     the robot is, for these names. report: takes the planner's report of a movement, its start state
     and its trajectory. contact: makes a ContactInformation.
     """
 
     def __init__(
         self,
-        ask: Callable[[str, Any, float], Any],
+        ask: Callable[..., Any],
         state: Callable[[tuple[str, ...]], FloatArray],
         report: Callable[[TrajectoryReport, Any, Any], None],
         contact: Callable[[], Any],
@@ -117,7 +120,28 @@ class PlannerAnswers:
             self._read = answer.cell_yaml, cell_from_yaml(answer.cell_yaml)
         return self._read[1]
 
-    def plan(self, request: Any, response: Any) -> Status:
+    def check_start(self, state: Any) -> None:
+        """Refuse to execute from a moveit_msgs/RobotState that is given and is not the robot's."""
+        cell = self.cell()
+        code = StatusCode.START_STATE_INVALID
+        given = robot_state(state, cell, "start_state", code)
+        if configuration_given(given):
+            joints = cell.robot.joint_names
+            q = self._joints(given, cell, code)
+            check_near(q, self._state(joints), joints, "start_state", code)
+
+    def check_begin(self, trajectory: Any) -> None:
+        """Refuse to execute a trajectory with points that does not begin where the robot is."""
+        joints = self.cell().robot.joint_names
+        first = JointState(name=trajectory.joint_names, position=trajectory.points[0].positions)
+        try:
+            q = configuration_from_msg(first, joints)
+        except InvalidValueError:
+            return  # the controller says what is wrong with its joints
+        code = StatusCode.INVALID_MOTION_PLAN
+        check_near(q, self._state(joints), joints, "the first point", code)
+
+    def plan(self, request: Any, response: Any, canceled: Canceled | None = None) -> Status:
         """GetMotionPlan."""
         given = request.motion_plan_request
         answer = response.motion_plan_response
@@ -126,9 +150,8 @@ class PlannerAnswers:
         asked = movement(given, cell, settings.group, settings.safety_distance)
         status = Status(StatusCode.FAILURE)
         for one in asked:
-            planned = self._ask(
-                names.PLAN_REGIONAL_MOVEMENT, one, one.options.planning_time + _PATIENCE
-            )
+            patience = one.options.planning_time + _PATIENCE
+            planned = self._ask(names.PLAN_REGIONAL_MOVEMENT, one, patience, canceled)
             status = status_from_msg(planned.status)
             if status.ok:
                 break
@@ -396,7 +419,7 @@ class MoveItNode(Node):
         )
         plans = MutuallyExclusiveCallbackGroup()
         questions = MutuallyExclusiveCallbackGroup()
-        self._executor = TrajectoryExecution(self._drive)
+        self._executor = TrajectoryExecution(self._drive, answers.check_begin)
         apply = self._guarded(SERVICES["ApplyPlanningScene"], answers.apply_scene)
         self._monitor = SceneMonitor(
             self,
@@ -432,7 +455,10 @@ class MoveItNode(Node):
             BoundedService(self, types[kind], name, guarded, group, put=put_error_code)
         plan_type = types["GetMotionPlan"]
         move = MoveAction(
-            answers.plan, lambda: (plan_type.Request(), plan_type.Response()), self._executor
+            answers.plan,
+            lambda: (plan_type.Request(), plan_type.Response()),
+            answers.check_start,
+            self._executor,
         )
         self._actions = [
             self._offer_action("MoveGroup", move.run),

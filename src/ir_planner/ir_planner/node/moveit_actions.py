@@ -11,7 +11,7 @@ from typing import Any
 
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.node.moveit_scene import refusal
-from ir_values.errors import IrError, shown
+from ir_values.errors import CallGivenUpError, IrError, shown
 
 MOVE = "move_action"
 EXECUTE = "execute_trajectory"
@@ -38,10 +38,14 @@ class TrajectoryExecution:
     """Lets the controller drive a trajectory.
 
     send: sends a goal and waits for its result; the second argument says when it is canceled.
+    check_begin: refuses a trajectory that does not begin where the robot is.
     """
 
-    def __init__(self, send: Callable[[Any, Canceled], Any]) -> None:
+    def __init__(
+        self, send: Callable[[Any, Canceled], Any], check_begin: Callable[[Any], None]
+    ) -> None:
         self._send = send
+        self._check_begin = check_begin
         self._stops = 0
 
     def stop(self) -> None:
@@ -63,6 +67,7 @@ class TrajectoryExecution:
             )
         if not trajectory.joint_trajectory.points:
             return Status.success("a trajectory without points: nothing was driven")
+        self._check_begin(trajectory.joint_trajectory)
         if stopped():
             return Status(StatusCode.PREEMPTED, "stopped before it was driven")
         result = self._send(follow_goal()(trajectory=trajectory.joint_trajectory), stopped)
@@ -77,12 +82,14 @@ class TrajectoryExecution:
 
 @dataclass(frozen=True)
 class MoveAction:
-    """The action MoveGroup. plan: GetMotionPlan, from its request and response to a status; new:
-    the two, empty.
+    """The action MoveGroup. plan: GetMotionPlan, from its request and response, and whether it is
+    canceled, to a status; new: the two, empty. check_start: refuses a state that is given and is
+    not the robot's.
     """
 
-    plan: Callable[[Any, Any], Status]
+    plan: Callable[[Any, Any, Canceled], Status]
     new: Callable[[], tuple[Any, Any]]
+    check_start: Callable[[Any], None]
     executor: TrajectoryExecution
 
     def run(self, goal: Any, result: Any, canceled: Canceled, feedback: Feedback) -> Status:
@@ -93,15 +100,17 @@ class MoveAction:
         request, response = self.new()
         request.motion_plan_request = goal.request
         if not options.plan_only:  # as in MoveIt: what is driven begins where the robot is
+            self.check_start(goal.request.start_state)
             request.motion_plan_request.start_state = type(goal.request.start_state)(is_diff=True)
         feedback("PLANNING")
-        status = self.plan(request, response)
+        try:
+            status = self.plan(request, response, stopped)
+        except CallGivenUpError:
+            return Status(StatusCode.PREEMPTED, "stopped while it was planned")
         planned = response.motion_plan_response
         result.trajectory_start = planned.trajectory_start
         result.planned_trajectory = planned.trajectory
         result.planning_time = planned.planning_time
-        if stopped():
-            return Status(StatusCode.PREEMPTED, "stopped while it was planned")
         if options.plan_only or not status.ok:
             return status
         feedback("MONITOR")

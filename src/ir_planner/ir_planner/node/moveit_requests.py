@@ -32,6 +32,8 @@ from ir_values.settings import check_settings, setting
 
 PIPELINE = "ir_planner"
 WAYPOINTS_MAX = 1000
+START_TOLERANCE = 0.01
+"""rad, per joint: `trajectory_execution.allowed_start_tolerance` of MoveIt, as it comes."""
 _WHOLE_TURN = 3.14  # rad: a tolerance of pi, as people round it
 _ROTATION_VECTOR = (
     1  # parameterization of moveit_msgs/OrientationConstraint; 0: angles about x, y, z
@@ -111,6 +113,19 @@ def robot_state(state: Any, cell: Cell, what: str, code: StatusCode) -> Any:
     except InvalidValueError as error:
         remedy = "give all, or none for where the robot is"
         raise RequestError(code, f"{what}: {error}; {remedy}") from error
+
+
+def check_near(
+    q: FloatArray, where: FloatArray, joints: Sequence[str], what: str, code: StatusCode
+) -> None:
+    """Refuse joint values (n,) of what is to be driven that are not those where the robot is."""
+    j = int(np.abs(q - where).argmax())
+    if abs(q[j] - where[j]) > START_TOLERANCE:
+        raise refusal(
+            f"{what} has {joints[j]} at {q[j]:.4f} rad and the robot is at {where[j]:.4f} rad",
+            f"what is executed begins within {START_TOLERANCE:g} rad of where the robot is",
+            code,
+        )
 
 
 def tcp_at(link: str, pose: FloatArray, cell: Cell) -> FloatArray:

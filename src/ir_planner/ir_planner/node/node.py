@@ -150,16 +150,19 @@ class PlannerNode(Node):
             (ExportProgram, names.EXPORT_PROGRAM, ask.export_program, long),
             (PlanStandby, names.PLAN_STANDBY, ask.plan_standby, waiting),
             (EvaluateTrajectory, names.EVALUATE_TRAJECTORY, ask.evaluate_trajectory, long),
-            (PlanServiceMovement, names.PLAN_SERVICE_MOVEMENT, ask.plan_service, long),
-            (PlanRegionalMovement, names.PLAN_REGIONAL_MOVEMENT, ask.plan_regional, long),
-            (PlanEscape, names.PLAN_ESCAPE, ask.plan_escape, long),
-            (PlanTrajectory, names.PLAN_TRAJECTORY, ask.plan_trajectory, long),
-            (PlanCartesianMovement, names.PLAN_CARTESIAN_MOVEMENT, ask.plan_cartesian, long),
-            (OptimizeTrajectory, names.OPTIMIZE_TRAJECTORY, ask.optimize_trajectory, long),
-            (PlanProgram, names.PLAN_PROGRAM, ask.plan_program, long),
-            (PlanSteadyCycle, names.PLAN_STEADY_CYCLE, ask.plan_steady_cycle, long),
         ):
             BoundedService(self, kind, own(name), ask.guarded(handler), group)
+        for kind, name, handler in (
+            (PlanServiceMovement, names.PLAN_SERVICE_MOVEMENT, ask.plan_service),
+            (PlanRegionalMovement, names.PLAN_REGIONAL_MOVEMENT, ask.plan_regional),
+            (PlanEscape, names.PLAN_ESCAPE, ask.plan_escape),
+            (PlanTrajectory, names.PLAN_TRAJECTORY, ask.plan_trajectory),
+            (PlanCartesianMovement, names.PLAN_CARTESIAN_MOVEMENT, ask.plan_cartesian),
+            (OptimizeTrajectory, names.OPTIMIZE_TRAJECTORY, ask.optimize_trajectory),
+            (PlanProgram, names.PLAN_PROGRAM, ask.plan_program),
+            (PlanSteadyCycle, names.PLAN_STEADY_CYCLE, ask.plan_steady_cycle),
+        ):
+            BoundedService(self, kind, own(name), ask.guarded(handler), long, watching=True)
         self._action = RecordedActionServer(
             self,
             Plan,
@@ -183,7 +186,7 @@ class PlannerNode(Node):
         ask = self._requests
         plan = ask.guarded(
             lambda request, result: ask.plan_program(
-                request, result, progress, lambda: bool(goal.is_cancel_requested)
+                request, result, lambda: bool(goal.is_cancel_requested), progress
             )
         )
         result = plan(goal.request, Plan.Result())

@@ -13,7 +13,7 @@ from ir_kernels import KernelError
 from ir_msgs_py.names import PLANNER
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.search_conversions import searches_to_msg
-from ir_msgs_py.ros.serving import answered, unexpected
+from ir_msgs_py.ros.serving import Gone, answered, unexpected
 from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -57,6 +57,8 @@ from ir_planner.service import ServicePlan
 from ir_values.arrays import FloatArray
 from ir_values.errors import IrError, PoseError
 
+_NEVER: Gone = lambda: False  # noqa: E731 - a default argument
+
 
 def known_status(error: Exception) -> Status | None:  # noqa: PLR0911
     """The status of a request that an error ended, None for one that nobody thought of."""
@@ -81,7 +83,7 @@ def refused(error: Exception) -> Status:
 
 
 class Requests:
-    """Handlers of the planner's services.
+    """Handlers of the planner's services; those that plan also take whether they are cancelled.
 
     now: the node's clock [s]. cell_changed and planned: called after the cell changed or a
     trajectory was planned; service_planned: the same for the candidates at a station,
@@ -111,15 +113,16 @@ class Requests:
         self.service_planned = service_planned
         self.program_saves = program_saves
 
-    def guarded(self, handler: Callable[[Any, Any], Status]) -> Callable[[Any, Any], Any]:
+    def guarded(self, handler: Callable[..., Status]) -> Callable[..., Any]:
         """The handler as a service callback: its status goes into the response, whatever
         happens.
         """
 
-        def callback(request: Any, response: Any) -> Any:
-            return answered(
-                response, PLANNER, lambda: handler(request, response), known_status, self.log
-            )
+        def callback(request: Any, response: Any, *cancelled: Gone) -> Any:
+            def work() -> Status:
+                return handler(request, response, *cancelled)
+
+            return answered(response, PLANNER, work, known_status, self.log)
 
         return callback
 
@@ -195,7 +198,7 @@ class Requests:
         fill_ik(response, answer)
         return answer.status
 
-    def plan_regional(self, request: Any, response: Any) -> Status:
+    def plan_regional(self, request: Any, response: Any, cancelled: Gone = _NEVER) -> Status:
         """From machine to machine."""
         cell = self.planner.cell
         options = options_of(request.options, self.draw_seed)
@@ -221,19 +224,22 @@ class Requests:
             via_tolerance=request.via_tolerance,
             via_distance=request.via_distance,
             options=options,
+            cancelled=cancelled,
         )
         response.searches = searches_to_msg(plan.info.searches)
         return self._movement(plan, response, options.include_points)
 
-    def plan_escape(self, request: Any, response: Any) -> Status:
+    def plan_escape(self, request: Any, response: Any, cancelled: Gone = _NEVER) -> Status:
         """Away from what is too near, and back within the limits."""
         options = options_of(request.options, self.draw_seed)
         start = self._state(request.start, StatusCode.START_STATE_INVALID, at_rest="start")
-        plan = self.planner.plan_escape(start, station=request.station, options=options)
+        plan = self.planner.plan_escape(
+            start, station=request.station, options=options, cancelled=cancelled
+        )
         fill_escape(response, plan, options.include_points)
         return self._shown(plan)
 
-    def plan_service(self, request: Any, response: Any) -> Status:
+    def plan_service(self, request: Any, response: Any, cancelled: Gone = _NEVER) -> Status:
         """Out of a machine's work area, or into it."""
         options = options_of(request.options, self.draw_seed)
         cell = self.planner.cell
@@ -247,38 +253,43 @@ class Requests:
             near=here,
             max_candidates=most,
             options=options,
+            cancelled=cancelled,
         )
         fill_service(response, plan, options.include_points)
         if plan.candidates:
             self.service_planned(request.station, plan)
         return plan.status
 
-    def plan_trajectory(self, request: Any, response: Any) -> Status:
+    def plan_trajectory(self, request: Any, response: Any, cancelled: Gone = _NEVER) -> Status:
         """Through given points."""
         options = options_of(request.options, self.draw_seed)
         reference = reference_of(request.reference, self.planner.cell)
         return self._movement(
-            self.planner.plan_trajectory(reference, options=options),
+            self.planner.plan_trajectory(reference, options=options, cancelled=cancelled),
             response,
             options.include_points,
         )
 
-    def plan_cartesian(self, request: Any, response: Any) -> Status:
+    def plan_cartesian(self, request: Any, response: Any, cancelled: Gone = _NEVER) -> Status:
         """The tool along a path."""
         options = options_of(request.options, self.draw_seed)
         cell = self.planner.cell
         start = state_of(request.start, cell, StatusCode.START_STATE_INVALID, "start")
         plan = self.planner.plan_cartesian(
-            path_of(request, cell), options=options, start=start, t1=request.t1
+            path_of(request, cell),
+            options=options,
+            start=start,
+            t1=request.t1,
+            cancelled=cancelled,
         )
         fill_cartesian(response, plan, options.include_points)
         return self._shown(plan)
 
-    def optimize_trajectory(self, request: Any, response: Any) -> Status:
+    def optimize_trajectory(self, request: Any, response: Any, cancelled: Gone = _NEVER) -> Status:
         """The same end points for less."""
         options = options_of(request.options, self.draw_seed)
         plan = self.planner.optimize_trajectory(
-            trajectory_of(request, self.planner), options=options
+            trajectory_of(request, self.planner), options=options, cancelled=cancelled
         )
         fill_optimization(response, plan, options.include_points)
         return self._shown(plan)
@@ -297,8 +308,8 @@ class Requests:
         self,
         request: Any,
         response: Any,
+        cancelled: Gone = _NEVER,
         progress: Callable[[str, int, int, float], None] = lambda phase, done, total, cost: None,
-        cancelled: Callable[[], bool] = lambda: False,
     ) -> Status:
         """A whole program; also what the action does."""
         options = options_of(request.options, self.draw_seed)
@@ -321,12 +332,13 @@ class Requests:
                 self.planned(movement.trajectory)
         return plan.status
 
-    def plan_steady_cycle(self, request: Any, response: Any) -> Status:
+    def plan_steady_cycle(self, request: Any, response: Any, cancelled: Gone = _NEVER) -> Status:
         """The cheapest cycle of the cell's route."""
         options = options_of(request.options, self.draw_seed)
         plan = self.planner.plan_steady_cycle(
             parts_per_hour=request.parts_per_hour,
             options=options,
+            cancelled=cancelled,
             units=request.units,
             cycles=request.cycles,
             saving=request.savings,
