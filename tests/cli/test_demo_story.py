@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,8 +13,10 @@ import pytest
 
 from ir_cli.errors import DemonstrationError, ProcessError
 from ir_cli.output import Progress
-from ir_cli.ros.demo import LONGEST_PAUSE, Demonstration, finish_recording
+from ir_cli.ros.demo import LONGEST_PAUSE, Demonstration, finish_recording, recorded
+from ir_cli.ros.robots_demo import driven_together
 from ir_description import load_cell
+from ir_msgs_py.ros.client import ProgramRun
 from ir_values.errors import CallTimedOutError, RequestRefusedError
 
 STORY = {
@@ -77,18 +82,71 @@ class SlowRecorder:
 
 
 def test_a_recording_is_finished_however_long_it_takes_while_the_nodes_live() -> None:
-    alive: list[None] = []
+    alive: list[str] = []
     recorder = SlowRecorder(0.5)
-    finish_recording(recorder, SimpleNamespace(check=lambda: alive.append(None)))
+    finish_recording(recorder, SimpleNamespace(check=lambda only: alive.append(only)))
     assert recorder.asked == ["/ir_recorder/stop"]
     assert len(alive) >= 2
+    assert set(alive) == {"ir_recorder.node"}  # that another has died keeps it from nothing
 
 
 def test_a_recorder_that_has_died_is_named_at_once() -> None:
-    def dead() -> None:
+    def dead(only: str) -> None:
         raise ProcessError("ir_recorder was killed")
 
     begun = time.monotonic()
     with pytest.raises(ProcessError, match="ir_recorder was killed"):
         finish_recording(SlowRecorder(30.0), SimpleNamespace(check=dead))
     assert time.monotonic() - begun < 10.0
+
+
+def test_a_recording_is_finished_whatever_ends_what_is_recorded(tmp_path: Path) -> None:
+    asked: list[str] = []
+    client = SimpleNamespace(ask=lambda service, *_: asked.append(service))
+    nodes = SimpleNamespace(check=lambda only: None)
+    with pytest.raises(KeyboardInterrupt), recorded(client, nodes, tmp_path / "x.mcap"):
+        raise KeyboardInterrupt
+    assert asked == ["/ir_recorder/start", "/ir_recorder/stop"]
+
+
+def waiting(begun: threading.Event) -> Callable[..., ProgramRun]:
+    """A robot that waits for another, and ends when it is given up."""
+
+    def drive(give_up: Callable[[], bool]) -> ProgramRun:
+        begun.set()
+        deadline = time.monotonic() + 60.0
+        while not give_up() and time.monotonic() < deadline:
+            time.sleep(0.005)
+        raise RequestRefusedError("canceled in step 1" if give_up() else "waited too long", -7)
+
+    return drive
+
+
+def test_a_robot_that_fails_stops_the_others_and_its_reason_is_the_answer() -> None:
+    begun = threading.Event()
+
+    def failing(give_up: Callable[[], bool]) -> ProgramRun:
+        assert begun.wait(60.0)
+        raise RequestRefusedError("the robot is not ready", -6)
+
+    runs, failed = driven_together({"left": waiting(begun), "right": failing})
+    assert not runs
+    assert failed == "right: the robot is not ready; then left: canceled in step 1"
+    run = ProgramRun(1, 2.0, 3.0)
+    whole = {robot: lambda give_up: run for robot in ("left", "right")}
+    assert driven_together(whole) == ({"left": run, "right": run}, "")
+
+
+def test_ctrl_c_stops_every_robot() -> None:
+    begun = {robot: threading.Event() for robot in ("left", "right")}
+
+    def press() -> None:
+        for each in begun.values():
+            each.wait(60.0)
+        signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+
+    threading.Thread(target=press, daemon=True).start()
+    before = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        driven_together({robot: waiting(each) for robot, each in begun.items()})
+    assert time.monotonic() - before < 30.0  # nobody waited too long

@@ -231,6 +231,7 @@ LONGEST_TRANSITION = 600.0
 """Longest wait for a mode [s] where transitions take as long as the controller's."""
 LOOK_SECONDS = 0.1
 """Between two looks whether the nodes are there."""
+_RECORDER = f"{names.RECORDER}.node"
 FINISH_SECONDS = 3600.0
 """Longest wait for a recorder that lives to close its file [s]: an answer that is lost ends it."""
 START_SECONDS = 60.0
@@ -336,11 +337,9 @@ class Demonstration:
                 )
             )
             await_services(client, nodes, _SERVICES)
-            with naming_the_dead(nodes):
-                self._start_recording(client, recording)
+            with naming_the_dead(nodes), recorded(client, nodes, recording):
                 progress.end(str(recording))
                 failed = self._story(client)
-                finish_recording(client, nodes)
             nodes.end()
         progress.begin("read the recording, write report and picture")
         loads = 0 if failed else len(self._loads)
@@ -393,10 +392,6 @@ class Demonstration:
                 f"{seconds:g} s" for seconds in self._full_pauses
             )
         return [f"{key}={value}" for key, value in facts.items()]
-
-    def _start_recording(self, client: Client, path: Path) -> None:
-        request = StartRecording.Request(path=str(path.resolve()), overwrite=True)
-        client.ask("/" + names.START_RECORDING, request)
 
     def _plan(self, client: Client) -> ProgramPlan:
         self._progress.begin("plan the program")
@@ -463,9 +458,20 @@ def await_services(client: Client, nodes: NodeProcesses, services: Sequence[str]
         time.sleep(LOOK_SECONDS)
 
 
+@contextmanager
+def recorded(client: Client, nodes: NodeProcesses, path: Path) -> Iterator[None]:
+    """Record into a file what happens meanwhile, however that ends: also by Ctrl-C."""
+    request = StartRecording.Request(path=str(path.resolve()), overwrite=True)
+    client.ask("/" + names.START_RECORDING, request)
+    try:
+        yield
+    finally:
+        finish_recording(client, nodes)
+
+
 def finish_recording(client: Client, nodes: NodeProcesses) -> None:
-    """Let the recorder close its file, however long a loaded machine takes for it; a node that ends
-    meanwhile is named at once.
+    """Let the recorder close its file, however long a loaded machine takes for it; a recorder that
+    ends meanwhile is named at once.
     """
     answer: Future[object] = Future()
 
@@ -478,7 +484,7 @@ def finish_recording(client: Client, nodes: NodeProcesses) -> None:
 
     threading.Thread(target=ask, daemon=True).start()
     while not wait([answer], LOOK_SECONDS).done:
-        nodes.check()
+        nodes.check(only=_RECORDER)
     answer.result()
 
 

@@ -111,9 +111,13 @@ class NodeProcesses:
         """Process ids by name."""
         return {name: process.pid for name, process in self._running.items()}
 
-    def check(self) -> None:
-        """Raise ProcessError when a node has ended on its own, with the end of what it printed."""
+    def check(self, only: str = "") -> None:
+        """Raise ProcessError when a node, or the only one that counts, has ended on its own, with
+        the end of what it printed.
+        """
         for name, process in self._running.items():
+            if only not in ("", name):
+                continue
             code = process.poll()
             if code is not None:
                 last = self._log(name).read_text(errors="replace").splitlines()[-12:]

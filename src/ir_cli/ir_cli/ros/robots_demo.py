@@ -7,11 +7,13 @@ stand where their programs begin, pauses and transitions are as they are.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 
@@ -23,12 +25,11 @@ from ir_cli.ros.demo import (
     Tended,
     await_services,
     check_lines,
-    finish_recording,
     naming_the_dead,
+    recorded,
 )
 from ir_cli.ros.processes import NodeCommand, NodeProcesses
 from ir_description import RobotCells, is_path
-from ir_msgs.srv import StartRecording
 from ir_msgs_py import names
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
@@ -136,12 +137,9 @@ class RobotsDemonstration:
             services = [names.START_RECORDING]
             services += [f"{robot}/{names.SET_PLC_INPUT}" for robot in plan.robots]
             await_services(client, nodes, services)
-            with naming_the_dead(nodes):
-                request = StartRecording.Request(path=str(recording.resolve()), overwrite=True)
-                client.ask("/" + names.START_RECORDING, request)
+            with naming_the_dead(nodes), recorded(client, nodes, recording):
                 progress.end(str(recording))
                 failed = self._drive(programs, stack)
-                finish_recording(client, nodes)
             nodes.end()
         progress.begin("read the recording, write a page of each robot and one of all")
         outcome = examine_robots(recording, self._cells.robots, self._out, failed)
@@ -202,21 +200,44 @@ class RobotsDemonstration:
             robot: stack.enter_context(Client(robot, timeout=START_SECONDS, node_name="ir_demo"))
             for robot in programs
         }
-        pool = stack.enter_context(ThreadPoolExecutor(len(programs)))
-        futures = {
-            robot: pool.submit(clients[robot].run_program, steps)
-            for robot, steps in programs.items()
+        drives = {
+            robot: partial(clients[robot].run_program, steps) for robot, steps in programs.items()
         }
-        runs: dict[str, ProgramRun] = {}
-        sentences = []
-        for robot, future in futures.items():
-            try:
-                runs[robot] = future.result()
-            except (DemonstrationError, IrError) as error:
-                sentences.append(f"{robot}: {error}")
+        runs, failed = driven_together(drives)
         said = [f"{r} {run.duration:.1f} s, {run.energy / 1e3:.1f} kJ" for r, run in runs.items()]
-        self._progress.end("; ".join([*said, *(["ended early"] if sentences else [])]))
-        return "; ".join(sentences)
+        self._progress.end("; ".join([*said, *(["ended early"] if failed else [])]))
+        return failed
+
+
+def driven_together(
+    drives: Mapping[str, Callable[..., ProgramRun]],
+) -> tuple[dict[str, ProgramRun], str]:
+    """Drive all robots at once, by what drives each until its `give_up` says so: the runs that
+    ended well, and why another did not, "" where all did. One that fails stops the others, and so
+    does whatever is raised here, as by Ctrl-C.
+    """
+    stopped = Event()
+    sentences: list[str] = []
+    runs: dict[str, ProgramRun] = {}
+
+    def drive(robot: str) -> None:
+        try:
+            runs[robot] = drives[robot](give_up=stopped.is_set)
+        except (DemonstrationError, IrError) as error:
+            sentences.append(f"{robot}: {error}")
+            stopped.set()
+        except BaseException:
+            stopped.set()
+            raise
+
+    with ThreadPoolExecutor(len(drives)) as pool:
+        try:
+            for future in [pool.submit(drive, robot) for robot in drives]:
+                future.result()
+        except BaseException:
+            stopped.set()
+            raise
+    return runs, "; then ".join(sentences)
 
 
 def examine_robots(

@@ -602,13 +602,16 @@ class Client:
         program: str | Sequence[PlannedMovement],
         progress: Callable[[RunProgram.Feedback], object] | None = None,
         timeout: float = float("inf"),
+        give_up: Callable[[], bool] | None = None,
     ) -> ProgramRun:
-        """Run a planned program, by its id or its steps; progress gets the action's feedback."""
+        """Run a planned program, by its id or its steps; progress gets the action's feedback.
+        give_up: asked meanwhile; when it is true the program is canceled, which is a refusal.
+        """
         if isinstance(program, str):
             goal = RunProgram.Goal(program_id=program)
         else:
             goal = RunProgram.Goal(movements=[planned_movement_to_msg(step) for step in program])
-        result = self.send_goal(names.RUN_PROGRAM, goal, progress, timeout)
+        result = self.send_goal(names.RUN_PROGRAM, goal, progress, timeout, give_up)
         _check(names.RUN_PROGRAM, result)
         return ProgramRun(int(result.executed), float(result.duration), float(result.energy))
 
