@@ -390,13 +390,16 @@ def fleet_html(
         _section("Robots", _robots(robots, prices)),
         _section("Peak, and when nobody works", _around_the_clock(members, robots, prices)),
         _section("Month by month: driven and predicted", _months(members)),
-        folded(_section("By power mode", _matrix("mode", by_mode(known, prices), summed))),
+        folded(
+            _section("By power mode", _matrix("mode", by_mode(known, prices), summed)), paper=True
+        ),
         _section("What could be saved, by measure", _potential(known, summed, prices)),
         line_section(fleet_of_line(members, prices), prices),
         folded(
             _section(
                 "By movement and pause", _matrix("movement", by_movement(known, prices), summed)
-            )
+            ),
+            paper=True,
         ),
     ]
     title = f"{counted(len(robots), 'robot')}, {counted(len(members), 'recording')}"

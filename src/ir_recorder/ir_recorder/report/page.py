@@ -142,11 +142,14 @@ def report_html(
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("page.html"))
 
 
-def folded(section: str) -> str:
-    """A section that opens when its heading is chosen: what an engineer looks at."""
+def folded(section: str, *, paper: bool = False) -> str:
+    """A section that opens when its heading is chosen: what an engineer looks at. paper: it is
+    printed all the same.
+    """
+    kind = "part paper" if paper else "part"
     return re.sub(
         r"<section( id=\"\w+\")?><h2>(.*?)</h2>(.*)</section>",
-        r'<details class="part"\1><summary><h2>\2</h2></summary>\3</details>',
+        rf'<details class="{kind}"\1><summary><h2>\2</h2></summary>\3</details>',
         section,
         flags=re.DOTALL,
     )

@@ -71,7 +71,7 @@ function barsToSvg(place) {
 }
 
 /* What is folded on a screen and belongs on paper. */
-const folded = () => [...document.querySelectorAll("details.printed")];
+const folded = () => [...document.querySelectorAll("details.printed, details.paper")];
 let unfolded = [];
 addEventListener("beforeprint", () => {
   unfolded = folded().filter((part) => !part.open);
