@@ -4,11 +4,12 @@ Neighbours are left out: their bodies meet at the joint. Others that are near in
 near by construction: they keep a distance of their own, so that capsules that are wider than the
 bodies leave the robot its work. It is never below what the capsules were seen to be apart in a
 posture in which what they stand for meets: each piece of a link's surface stands for one capsule,
-the narrowest that holds it.
+the narrowest that holds it. Pieces within their radii are told apart by their triangles.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence, Set
 from typing import NamedTuple
 
@@ -16,7 +17,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ir_description import Capsule
-from ir_description.files.convex_pieces import fine_triangles, halved
+from ir_description.files.convex_pieces import fine_triangles, halved, point_triangle
 from ir_description.files.making import LinkBody, UrdfArm, beside_axis
 from ir_description.robot import ReducedDistance
 from ir_kernels import Chain, CollisionModel
@@ -49,6 +50,9 @@ _DEEPER = 60  # in which they overlap by more
 _FROM = 8  # postures that meet, around which others are looked at
 _AROUND = 24
 _STEPS = (0.06, 0.03, 0.015, 0.008)  # of the range of each joint
+_NEAREST = 5e-4  # m: surfaces that are nearer count as meeting
+_ROUGHLY = 2e-3  # m: the same where rings are counted
+_AT_ONCE = (30, 300)  # pieces, the nearest first, before all others are looked at
 
 
 class Pairs(NamedTuple):
@@ -141,14 +145,102 @@ def kept_sentence(reduced: ReducedDistance) -> str:
     return f"{first} and {second} {keep}: {reason}"
 
 
-class _Points(NamedTuple):
-    """Points (N, 3) of a surface, each of which stands for what is within its radius (N,) [m]."""
+class _Pieces(NamedTuple):
+    """Pieces of a surface, in balls of a radius (N,) [m] around `at` (N, 3): triangles (T, 3, 3) of
+    a piece (T,), which stand for what is within `beside` (T,) [m] of them.
+    """
 
     at: FloatArray
     radius: FloatArray
+    triangles: FloatArray
+    piece: IntArray
+    beside: FloatArray
 
-    def moved(self, pose: FloatArray) -> _Points:
-        return _Points(self.at @ pose[:3, :3].T + pose[:3, 3], self.radius)
+    @classmethod
+    def none(cls) -> _Pieces:
+        return cls(
+            np.zeros((0, 3)),
+            np.zeros(0),
+            np.zeros((0, 3, 3)),
+            np.zeros(0, dtype=int),
+            np.zeros(0),
+        )
+
+    @classmethod
+    def balls(cls, at: FloatArray, radius: float) -> _Pieces:
+        """Balls around points (N, 3), all of one radius [m]."""
+        around = np.full(len(at), radius)
+        return cls(at, around, np.repeat(at[:, None], 3, axis=1), np.arange(len(at)), around)
+
+    def and_of(self, other: _Pieces) -> _Pieces:
+        """These and others behind them."""
+        joined = [np.concatenate(both) for both in zip(self, other, strict=True)]
+        joined[3][len(self.piece) :] += len(self.at)
+        return _Pieces(*joined)
+
+
+class _Surface:
+    """Pieces of a surface, and trees of them and of their triangles."""
+
+    def __init__(self, pieces: _Pieces) -> None:
+        order = np.argsort(pieces.piece, kind="stable")
+        self.pieces = pieces._replace(
+            triangles=pieces.triangles[order],
+            piece=pieces.piece[order],
+            beside=pieces.beside[order],
+        )
+        self.tree = cKDTree(pieces.at)
+        self._first = np.searchsorted(self.pieces.piece, np.arange(len(pieces.at) + 1))
+        self._centre = self.pieces.triangles.mean(axis=1)
+        self._radius = _radii(self.pieces.triangles, self._centre) + self.pieces.beside
+        self._facets = cKDTree(self._centre)
+
+    def meeting(
+        self, chosen: IntArray, pose: FloatArray, other: _Surface, near: float, first: bool
+    ) -> IntArray:
+        """Which of the chosen pieces are nearer than `near` [m] to another surface, none that are
+        farther; pose: of this one in the other one. first: whether some of them are enough.
+        """
+        count = self._first[chosen + 1] - self._first[chosen]
+        begin = np.cumsum(count) - count
+        rows = np.repeat(self._first[chosen] - begin, count) + np.arange(count.sum())
+        triangles = self.pieces.triangles[rows] @ pose[:3, :3].T + pose[:3, 3]
+        beside = self.pieces.beside[rows]
+        piece = self.pieces.piece[rows]
+        centre = triangles.mean(axis=1)
+        radius = _radii(triangles, centre)
+        reach = radius + beside + near
+        found = other._facets.query_ball_point(centre, reach + other._radius.max(initial=0.0))
+        row = np.repeat(np.arange(len(centre)), [len(each) for each in found])
+        column = np.concatenate([*found, []]).astype(int)
+        apart = np.linalg.norm(centre[row] - other._centre[column], axis=1)
+        open_ = apart <= reach[row] + other._radius[column]
+        met = np.zeros(len(self.pieces.at), dtype=bool)
+        while True:
+            row = row[open_]
+            column = column[open_]
+            if not len(row):
+                return np.flatnonzero(met)
+            apart = point_triangle(centre[row], other.pieces.triangles[column])
+            apart -= beside[row] + other.pieces.beside[column]
+            met[piece[row[apart <= near]]] = True
+            if first and met.any():
+                return np.flatnonzero(met)
+            open_ = (apart <= radius[row] + near) & (radius[row] > 0.0) & ~met[piece[row]]
+            used, inverse = np.unique(row[open_], return_inverse=True)
+            row = np.concatenate([inverse + k * len(used) for k in range(4)])
+            column = np.tile(column[open_], 4)
+            triangles = halved(halved(triangles[used]))
+            beside = np.tile(beside[used], 4)
+            piece = np.tile(piece[used], 4)
+            centre = triangles.mean(axis=1)
+            radius = _radii(triangles, centre)
+            open_ = np.ones(len(row), dtype=bool)
+
+
+def _radii(triangles: FloatArray, centre: FloatArray) -> FloatArray:
+    """Of balls around points (T, 3) that hold triangles (T, 3, 3)."""
+    return np.asarray(np.linalg.norm(triangles - centre[:, None], axis=2).max(axis=1))
 
 
 class _Surfaces:
@@ -165,43 +257,35 @@ class _Surfaces:
         self._rounding = arm.rounding
         self._capsules = capsules
         self._bodies = bodies
-        self._known: dict[str, tuple[_Points, cKDTree]] = {}
+        self._known: dict[str, _Surface] = {}
 
-    def of(self, capsule: Capsule) -> tuple[_Points, cKDTree]:
-        """Points of what a capsule stands for, and a tree of them; of a link without a body,
-        none.
-        """
+    def of(self, capsule: Capsule) -> _Surface:
+        """What a capsule stands for; of a link without a body, nothing."""
         if capsule.name not in self._known:
             own = [each for each in self._capsules if each.link == capsule.link]
-            for each, points in zip(own, self._sampled(own), strict=True):
-                self._known[each.name] = points, cKDTree(points.at)
+            for each, pieces in zip(own, self._shared(own), strict=True):
+                self._known[each.name] = _Surface(pieces)
         return self._known[capsule.name]
 
-    def _sampled(self, capsules: Sequence[Capsule]) -> list[_Points]:
-        """Points of the surface of a link whose capsules are given, for each of them."""
-        found = [[_Points(np.zeros((0, 3)), np.zeros(0))] for _ in capsules]
+    def _shared(self, capsules: Sequence[Capsule]) -> list[_Pieces]:
+        """Pieces of the surface of a link whose capsules are given, for each of them."""
+        found = [_Pieces.none() for _ in capsules]
         for body in self._bodies[capsules[0].link]:
             wider = body.beside + self._rounding
             if body.exact is not None:
                 p0, p1, ball, _ = body.exact
                 half = 0.5 / (_ALONG - 1) * float(np.linalg.norm(p1 - p0))
-                points = _Points(np.linspace(p0, p1, _ALONG), np.full(_ALONG, ball + half + wider))
-                found[_holder(points.at, ball, capsules)].append(points)
+                balls = _Pieces.balls(np.linspace(p0, p1, _ALONG), ball + half + wider)
+                k = _holder(balls.at, ball, capsules)
+                found[k] = found[k].and_of(balls)
                 continue
             for k, share in enumerate(_shared_out(body.triangles, capsules)):
                 size = float(np.linalg.norm(capsules[k].p1 - capsules[k].p0))
                 step = (size + 2.0 * capsules[k].radius) / _VOXELS
                 if capsules[k].link in self._finer:
                     step = min(step, _FINE)
-                at, around = _voxels(share, step)
-                found[k].append(_Points(at, around + wider))
-        return [
-            _Points(
-                np.concatenate([each.at for each in own]),
-                np.concatenate([each.radius for each in own]),
-            )
-            for own in found
-        ]
+                found[k] = found[k].and_of(_voxels(share, step, wider))
+        return found
 
 
 def _outside(points: FloatArray, capsules: Sequence[Capsule]) -> FloatArray:
@@ -240,12 +324,12 @@ def _shared_out(triangles: FloatArray, capsules: Sequence[Capsule]) -> list[Floa
     return [np.concatenate(each) for each in found]
 
 
-def _voxels(triangles: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
-    """One point (N, 3) for the triangles in each voxel of an edge of `step` [m], and the radius
-    (N,) that holds these.
+def _voxels(triangles: FloatArray, step: float, beside: float) -> _Pieces:
+    """A piece for the triangles in each voxel of an edge of `step` [m], which stand for what is
+    within `beside` [m] of them.
     """
     if not len(triangles):
-        return np.zeros((0, 3)), np.zeros(0)
+        return _Pieces.none()
     triangles = fine_triangles(triangles, step)
     centres = triangles.mean(axis=1)
     cells = np.floor((centres - centres.min(axis=0)) / step).astype(np.int64)
@@ -256,7 +340,7 @@ def _voxels(triangles: FloatArray, step: float) -> tuple[FloatArray, FloatArray]
     radius = np.zeros(len(at))
     far = np.linalg.norm(triangles - at[which][:, None], axis=2).max(axis=1)
     np.maximum.at(radius, which, far)
-    return at, radius
+    return _Pieces(at, radius + beside, triangles, which, np.full(len(triangles), beside))
 
 
 def _thinned(rows: IntArray, most: int) -> IntArray:
@@ -281,13 +365,12 @@ class _Meeting:
         self._model = CollisionModel(chain, (one, other), (), [(one.name, other.name)])
         self._q = q
         self._joints = np.arange(one.link, other.link)
-        both = [surfaces.of(one), surfaces.of(other)]
-        self._sides = tuple(points for points, _ in both)
-        self._trees = tuple(tree for _, tree in both)
+        self._surfaces = (surfaces.of(one), surfaces.of(other))
+        self._sides = tuple(each.pieces for each in self._surfaces)
         self._counted = tuple(np.ones(len(each.at), dtype=bool) for each in self._sides)
         rings = [
-            _rings(points.at, *axis)
-            for points, axis in zip(self._sides, self._axes(one.link, other.link), strict=True)
+            _rings(pieces.at, *axis)
+            for pieces, axis in zip(self._sides, self._axes(one.link, other.link), strict=True)
         ]
         self._rings = tuple(each for each, _ in rings)
         self._ring_of = tuple(each for _, each in rings)
@@ -363,13 +446,25 @@ class _Meeting:
         return np.asarray(self._model.distances(q)[:, 0])
 
     def _meet(self, q: FloatArray) -> BoolArray:
-        """Whether the surfaces meet or may meet, by the radii of their points (N,)."""
+        """Whether the surfaces meet, or are too near to tell (N,)."""
         fewer = int(np.argmin([len(each.at) for each in self._sides]))
         sides = (0, 1) if self.built_so else (fewer,)
         result = np.zeros(len(q), dtype=bool)
         for k, poses in enumerate(self._relative(q)):
-            result[k] = any(len(self._meeting(side, poses[side])) for side in sides)
+            result[k] = any(self._meets(side, poses[side]) for side in sides)
         return result
+
+    def _meets(self, side: int, pose: FloatArray) -> bool:
+        """Whether a piece of a side that counts meets the other one."""
+        chosen = self._near(side, pose)
+        other = self._surfaces[1 - side]
+        for begin, end in itertools.pairwise((0, *_AT_ONCE, len(chosen))):
+            some = chosen[begin:end]
+            if len(some) and len(
+                self._surfaces[side].meeting(some, pose, other, _NEAREST, first=True)
+            ):
+                return True
+        return False
 
     def _relative(self, q: FloatArray) -> FloatArray:
         """Poses (N, 2, 4, 4) of each link in the other one."""
@@ -377,32 +472,42 @@ class _Meeting:
         there = np.linalg.inv(second) @ first
         return np.stack([there, np.linalg.inv(there)], axis=1)
 
-    def _meeting(self, side: int, pose: FloatArray) -> IntArray:
-        """Which points of a side may meet the other one; pose: of their link in the other one."""
+    def _near(self, side: int, pose: FloatArray) -> IntArray:
+        """Pieces of a side that may meet the other one by their radii, the nearest first; pose: of
+        their link in the other one.
+        """
         facing = self._capsules[1 - side]
         own = self._sides[side]
         middle = pose[:3, :3].T @ (0.5 * (facing.p0 + facing.p1) - pose[:3, 3])
         reach = 0.5 * float(np.linalg.norm(facing.p1 - facing.p0)) + facing.radius
-        near = self._trees[side].query_ball_point(middle, reach + float(own.radius.max()))
+        near = self._surfaces[side].tree.query_ball_point(middle, reach + float(own.radius.max()))
         chosen = np.array(near, dtype=int)
         chosen = chosen[self._counted[side][chosen]]
-        points = _Points(own.at[chosen], own.radius[chosen]).moved(pose)
-        beside = beside_axis(points.at, facing.p0, facing.p1)
-        inside = beside <= facing.radius + points.radius
+        at = own.at[chosen] @ pose[:3, :3].T + pose[:3, 3]
+        inside = beside_axis(at, facing.p0, facing.p1) <= facing.radius + own.radius[chosen]
         if not inside.any():
             return chosen[:0]
+        chosen = chosen[inside]
         most = float(self._sides[1 - side].radius.max())
-        radius = points.radius[inside]
-        limit = most + float(radius.max())
-        far, _ = self._trees[1 - side].query(points.at[inside], distance_upper_bound=limit)
-        return np.asarray(chosen[inside][far <= radius + most])
+        limit = most + float(own.radius[chosen].max())
+        far, _ = self._surfaces[1 - side].tree.query(at[inside], distance_upper_bound=limit)
+        beyond = far - own.radius[chosen] - most
+        order = np.argsort(beyond, kind="stable")
+        return np.asarray(chosen[order][beyond[order] <= 0.0])
 
     def _times_that_rings_meet(self, q: FloatArray) -> list[IntArray]:
-        """In how many postures some point of each ring may meet the other side."""
+        """In how many postures some piece of each ring meets the other side, or nearly does."""
         counts = [np.zeros(len(rings), dtype=int) for rings in self._rings]
         for poses in self._relative(q):
             for side, ring in enumerate(self._ring_of):
-                counts[side][np.unique(ring[self._meeting(side, poses[side])])] += 1
+                met = self._surfaces[side].meeting(
+                    self._near(side, poses[side]),
+                    poses[side],
+                    self._surfaces[1 - side],
+                    _ROUGHLY,
+                    first=False,
+                )
+                counts[side][np.unique(ring[met])] += 1
         return counts
 
     def _axes(self, first: int, second: int) -> list[tuple[FloatArray, FloatArray]]:
