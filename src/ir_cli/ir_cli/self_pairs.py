@@ -45,7 +45,7 @@ _ALONG = 20  # points along a body that is a capsule
 _TOUCH = 1e-9  # m: of rounding, by which a corner may be out of its capsule
 _HALVINGS = 16
 _LOOKED_AT = 48  # postures, for what is built so and in a round around those that meet
-_TRIED = 500  # postures in which capsules overlap, but by no more than usual
+_TRIED = 150  # postures in which capsules overlap, but by no more than usual
 _DEEPER = 60  # in which they overlap by more
 _FROM = 8  # postures that meet, around which others are looked at
 _AROUND = 24
@@ -209,14 +209,14 @@ class _Surface:
         piece = self.pieces.piece[rows]
         centre = triangles.mean(axis=1)
         radius = _radii(triangles, centre)
-        reach = radius + beside + near
-        found = other._facets.query_ball_point(centre, reach + other._radius.max(initial=0.0))
+        reach = radius + beside + near + other._radius.max(initial=0.0)
+        found = other._facets.query_ball_point(centre, reach)
         row = np.repeat(np.arange(len(centre)), [len(each) for each in found])
         column = np.concatenate([*found, []]).astype(int)
-        apart = np.linalg.norm(centre[row] - other._centre[column], axis=1)
-        open_ = apart <= reach[row] + other._radius[column]
         met = np.zeros(len(self.pieces.at), dtype=bool)
         while True:
+            apart = np.linalg.norm(centre[row] - other._centre[column], axis=1)
+            open_ = apart <= (radius + beside)[row] + near + other._radius[column]
             row = row[open_]
             column = column[open_]
             if not len(row):
@@ -235,7 +235,6 @@ class _Surface:
             piece = np.tile(piece[used], 4)
             centre = triangles.mean(axis=1)
             radius = _radii(triangles, centre)
-            open_ = np.ones(len(row), dtype=bool)
 
 
 def _radii(triangles: FloatArray, centre: FloatArray) -> FloatArray:
@@ -393,6 +392,8 @@ class _Meeting:
             _away(rings, each >= _BUILT_SO * len(few))[self._ring_of[side]]
             for side, (rings, each) in enumerate(zip(self._rings, times, strict=True))
         )
+        if all(each.all() for each in self._counted):
+            return found
         self.built_so = (
             "rings about a joint that do so in half of all, and what is within "
             f"{1e3 * _BESIDE:g} mm, are taken for built so"
