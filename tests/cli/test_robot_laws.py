@@ -103,6 +103,11 @@ def mesh(draw: np.random.Generator, path: Path, size: float) -> str:
     sides = ConvexHull(corners).simplices
     scale = draw.uniform(0.5, 1.5, 3) * [1.0, draw.choice([-1.0, 1.0]), 1.0]
     facets = [size * (corners * box + at)[side] / scale for box, at in boxes for side in sides]
+    return stl(np.array(facets), path, f'scale="{" ".join(f"{x:.17g}" for x in scale)}"')
+
+
+def stl(facets: np.ndarray, path: Path, scale: str = "") -> str:
+    """The element for triangles (T, 3, 3), which are written as a file of text."""
     path.write_text(
         "solid s\n"
         + "".join(
@@ -113,7 +118,7 @@ def mesh(draw: np.random.Generator, path: Path, size: float) -> str:
         )
         + "endsolid s\n"
     )
-    return f'<mesh filename="file://{path}" scale="{" ".join(f"{x:.17g}" for x in scale)}"/>'
+    return f'<mesh filename="file://{path}" {scale}/>'
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
@@ -229,6 +234,51 @@ def test_meshes_meet_in_no_allowed_posture_but_where_they_are_built_so(
     unkept = tuple(ReducedDistance(*pair, -1.0, "") for pair in made.robot.self_pairs)
     good, line = verdict(judge, replace(made.robot, reduced_distances=unkept), FAT_POSTURES)
     assert not good, line
+
+
+def test_links_that_lie_in_each_other_but_never_meet_keep_their_postures(tmp_path: Path) -> None:
+    """A ball of link 4 around the middle of the wrist, and 3 mm outside of it half a shell of link
+    6: their capsules overlap in every posture.
+    """
+    from judge_robots import Judge, verdict
+
+    turns = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(2000)
+    z = np.linspace(-1.0, 1.0, len(turns))
+    beside = np.sqrt(1.0 - z**2)
+    points = np.stack([beside * np.cos(turns), beside * np.sin(turns), z], axis=1)
+    around = points[ConvexHull(points).simplices]
+    shell = around[around[:, :, 0].min(axis=1) > 0.1]
+    meshes = {
+        4: stl(0.05 * around + [0.5, 0.0, 0.0], tmp_path / "ball.stl"),
+        6: stl(0.053 * shell - [0.15, 0.0, 0.0], tmp_path / "shell.stl"),
+    }
+    names = ["base_link", *(f"link_{k}" for k in range(1, 7))]
+    lines = ['<robot name="nested">']
+    for k, name in enumerate(names):
+        one = meshes.get(k, '<box size="0.04 0.04 0.04"/>')
+        lines.append(
+            f'<link name="{name}"><collision><geometry>{one}</geometry></collision></link>'
+        )
+        if k < 6:
+            lines.append(
+                f'<joint name="joint_{k + 1}" type="revolute"><parent link="{name}"/>'
+                f'<child link="{names[k + 1]}"/><origin xyz="{PLACES[k]}"/><axis xyz="{AXES[k]}"/>'
+                '<limit lower="-2.4" upper="2.4" effort="0" velocity="2"/></joint>'
+            )
+    path = tmp_path / "nested.urdf"
+    path.write_text("\n".join([*lines, "</robot>"]))
+    source = RobotSource(path, payload=5.0, mass=60.0)
+    made = made_robot(source)
+    link = {capsule.name: capsule.link for capsule in made.robot.capsules}
+    nested = [
+        each
+        for each in made.robot.reduced_distances
+        if {link[each.first], link[each.second]} == {4, 6}
+    ]
+    assert nested
+    assert all("were not seen to meet" in each.reason for each in nested)
+    good, line = verdict(Judge(source, made), made.robot, POSTURES)
+    assert good, line
 
 
 def coal_distance(shapes: object, placed: object, a: object, b: object) -> float:
