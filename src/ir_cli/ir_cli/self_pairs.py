@@ -44,14 +44,16 @@ _FINE = 0.006  # m: edge of a voxel of a link that is looked at more closely, at
 _ALONG = 20  # points along a body that is a capsule
 _TOUCH = 1e-9  # m: of rounding, by which a corner may be out of its capsule
 _HALVINGS = 16
-_LOOKED_AT = 48  # postures, for what is built so and in a round around those that meet
-_TRIED = 150  # postures in which capsules overlap, but by no more than usual
+_LOOKED_AT = 48  # postures, in a round around those that meet
+_TRIED = 500  # postures in which capsules overlap, but by no more than usual
 _DEEPER = 60  # in which they overlap by more
 _FROM = 8  # postures that meet, around which others are looked at
 _AROUND = 24
 _STEPS = (0.06, 0.03, 0.015, 0.008)  # of the range of each joint
 _NEAREST = 5e-4  # m: surfaces that are nearer count as meeting
 _ROUGHLY = 2e-3  # m: the same where rings are counted
+_TRIANGLES = 3_000_000  # pairs, after which two capsules are told apart by the pieces' radii
+_COUNTED = 16  # postures in which rings are counted
 _AT_ONCE = (30, 300)  # pieces, the nearest first, before all others are looked at
 
 
@@ -197,9 +199,10 @@ class _Surface:
 
     def meeting(
         self, chosen: IntArray, pose: FloatArray, other: _Surface, near: float, first: bool
-    ) -> IntArray:
+    ) -> tuple[IntArray, int]:
         """Which of the chosen pieces are nearer than `near` [m] to another surface, none that are
-        farther; pose: of this one in the other one. first: whether some of them are enough.
+        farther, and how many pairs of triangles were looked at for it; pose: of this one in the
+        other one. first: whether some of the pieces are enough.
         """
         count = self._first[chosen + 1] - self._first[chosen]
         begin = np.cumsum(count) - count
@@ -214,18 +217,20 @@ class _Surface:
         row = np.repeat(np.arange(len(centre)), [len(each) for each in found])
         column = np.concatenate([*found, []]).astype(int)
         met = np.zeros(len(self.pieces.at), dtype=bool)
+        looked_at = 0
         while True:
             apart = np.linalg.norm(centre[row] - other._centre[column], axis=1)
             open_ = apart <= (radius + beside)[row] + near + other._radius[column]
             row = row[open_]
             column = column[open_]
+            looked_at += len(row)
             if not len(row):
-                return np.flatnonzero(met)
+                return np.flatnonzero(met), looked_at
             apart = point_triangle(centre[row], other.pieces.triangles[column])
             apart -= beside[row] + other.pieces.beside[column]
             met[piece[row[apart <= near]]] = True
             if first and met.any():
-                return np.flatnonzero(met)
+                return np.flatnonzero(met), looked_at
             open_ = (apart <= radius[row] + near) & (radius[row] > 0.0) & ~met[piece[row]]
             used, inverse = np.unique(row[open_], return_inverse=True)
             row = np.concatenate([inverse + k * len(used) for k in range(4)])
@@ -374,6 +379,7 @@ class _Meeting:
         self._rings = tuple(each for each, _ in rings)
         self._ring_of = tuple(each for _, each in rings)
         self.built_so = ""
+        self._left = _TRIANGLES
 
     def largest_distance(self, usual: float) -> float:
         """What the capsules are apart at most [m] where the bodies meet, in all postures that were
@@ -382,7 +388,7 @@ class _Meeting:
         """
         if not all(len(each.at) for each in self._sides):
             return 0.0
-        few = self._q[:_LOOKED_AT]
+        few = self._q[:_COUNTED]
         distance = self._distances(self._q)
         found = self._found(distance, usual)
         if float((distance > found).mean()) >= _LEFT:
@@ -456,14 +462,20 @@ class _Meeting:
         return result
 
     def _meets(self, side: int, pose: FloatArray) -> bool:
-        """Whether a piece of a side that counts meets the other one."""
+        """Whether a piece of a side that counts meets the other one; after very many pairs of
+        triangles, whether it may by its radius.
+        """
         chosen = self._near(side, pose)
         other = self._surfaces[1 - side]
         for begin, end in itertools.pairwise((0, *_AT_ONCE, len(chosen))):
             some = chosen[begin:end]
-            if len(some) and len(
-                self._surfaces[side].meeting(some, pose, other, _NEAREST, first=True)
-            ):
+            if not len(some):
+                break
+            if self._left <= 0:
+                return True
+            met, looked_at = self._surfaces[side].meeting(some, pose, other, _NEAREST, first=True)
+            self._left -= looked_at
+            if len(met):
                 return True
         return False
 
@@ -501,7 +513,7 @@ class _Meeting:
         counts = [np.zeros(len(rings), dtype=int) for rings in self._rings]
         for poses in self._relative(q):
             for side, ring in enumerate(self._ring_of):
-                met = self._surfaces[side].meeting(
+                met, _ = self._surfaces[side].meeting(
                     self._near(side, poses[side]),
                     poses[side],
                     self._surfaces[1 - side],
