@@ -53,6 +53,7 @@ _STEPS = (0.06, 0.03, 0.015, 0.008)  # of the range of each joint
 _NEAREST = 5e-4  # m: surfaces that are nearer count as meeting
 _ROUGHLY = 2e-3  # m: the same where rings are counted
 _TRIANGLES = 3_000_000  # pairs, after which two capsules are told apart by the pieces' radii
+_IN_RINGS = 300  # pieces of a side that are looked at for rings in a posture, about
 _COUNTED = 16  # postures in which rings are counted
 _AT_ONCE = (30, 300)  # pieces, the nearest first, before all others are looked at
 
@@ -514,7 +515,7 @@ class _Meeting:
         for poses in self._relative(q):
             for side, ring in enumerate(self._ring_of):
                 met, _ = self._surfaces[side].meeting(
-                    self._near(side, poses[side]),
+                    _thinned(self._near(side, poses[side]), _IN_RINGS),
                     poses[side],
                     self._surfaces[1 - side],
                     _ROUGHLY,
