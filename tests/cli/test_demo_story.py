@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 import time
@@ -143,7 +144,7 @@ def test_ctrl_c_stops_every_robot() -> None:
     def press() -> None:
         for each in begun.values():
             each.wait(60.0)
-        signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+        os.kill(os.getpid(), signal.SIGINT)
 
     threading.Thread(target=press, daemon=True).start()
     before = time.monotonic()
