@@ -285,6 +285,11 @@ def _read_file(path: Path, roots: FileRoots, chunks: ChunkReader) -> RawRecordin
 
 
 def _collect(stream: BinaryIO, chunks: ChunkReader) -> _Collector:
+    """All records of a file up to its end or to where it can't be read on.
+
+    Damage is a sentence among the problems, and what was read before it stays; a file that was cut
+    off isn't `complete`. InvalidMagic where it is no MCAP file at all.
+    """
     found = _Collector()
     size = os.fstat(stream.fileno()).st_size  # no record is longer than its file
     records = StreamReader(stream, emit_chunks=True, record_size_limit=size).records
