@@ -297,4 +297,10 @@ def test_hibernation_outside_of_the_shifts_is_a_headline(analysis: Analysis) -> 
     assert year is not None
     both = yearly_money(costs.money(year.value) + found.saved, "EUR")
     assert f"<span>saved a year, both together</span><b>{both}</b>" in rows[0]
+    assert cycle.savings is not None
+    total = cycle.savings.total
+    common = total.common * costs.cycles_per_year(total.seconds or cycle.seconds)
+    today = costs.money(common) + found.left_alone
+    then = today - costs.money(year.value) - found.saved
+    assert f"{yearly_money(then, 'EUR')} instead of {yearly_money(today, 'EUR')}" in rows[0]
     assert idle_saving({}, costs) is None

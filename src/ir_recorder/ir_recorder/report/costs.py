@@ -595,11 +595,15 @@ _TODAY = "<small>today: what the controller does if left alone</small>"
 
 @dataclass(frozen=True)
 class IdleSaving:
-    """Money of a year outside of the shifts: the controller left alone, and in its deepest mode."""
+    """Money of a year outside of the shifts: the controller left alone, and in its deepest mode;
+    and the power of both [W].
+    """
 
     mode: str
     left_alone: float
     deepest: float
+    watts_left_alone: float
+    watts_deepest: float
 
     @property
     def saved(self) -> float:
@@ -613,11 +617,9 @@ def idle_saving(watts_at_rest: Mapping[str, float], costs: Costs) -> IdleSaving 
     """
     if not {LEFT_ALONE, _DEEPEST} <= set(watts_at_rest) or costs.idle_hours <= 0.0:
         return None
-    left, deepest = (
-        watts_at_rest[mode] * costs.idle_hours / 1000.0 * costs.idle_price
-        for mode in (LEFT_ALONE, _DEEPEST)
-    )
-    found = IdleSaving(_DEEPEST.lower(), left, deepest)
+    watts = [watts_at_rest[mode] for mode in (LEFT_ALONE, _DEEPEST)]
+    left, deepest = (each * costs.idle_hours / 1000.0 * costs.idle_price for each in watts)
+    found = IdleSaving(_DEEPEST.lower(), left, deepest, *watts)
     return found if found.saved >= _NOTHING else None
 
 

@@ -89,7 +89,10 @@ class Paid:
         return Tile(
             "saved a year at night and at weekends",
             yearly_money(found.saved, costs.currency),
-            (f"{today} with the brakes closed, {then} in {found.mode}",),
+            (
+                f"{today} with the brakes closed ({found.watts_left_alone:.0f} W)",
+                f"{then} in {found.mode} ({found.watts_deepest:.0f} W)",
+            ),
         )
 
     def _both(self, costs: Costs) -> Tile | None:
@@ -97,9 +100,16 @@ class Paid:
             return None
         night = self.idle.saved
         money = self.saved.of(costs.money)
-        word, gain = Amount(money.value + night, money.low + night, money.high + night).gain()
+        saved = Amount(money.value + night, money.low + night, money.high + night)
+        word, gain = saved.gain()
         price = yearly_money(gain.value, costs.currency)
-        return Tile(f"{word} a year, both together", price, (_between(gain, costs),))
+        today = costs.money(self.common) + self.idle.left_alone
+        before, after = (
+            yearly_money(cost, costs.currency) for cost in (today, today - saved.value)
+        )
+        share = f"{_percent(gain.value, today)} {'less' if word == 'saved' else 'more'}"
+        notes = (_between(gain, costs), f"{after} instead of {before}: {share}")
+        return Tile(f"{word} a year, both together", price, notes)
 
     def _line(self) -> Tile | None:
         if self.line is None:

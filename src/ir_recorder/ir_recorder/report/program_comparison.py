@@ -23,6 +23,7 @@ from ir_recorder.report.charts import Point, front_part
 from ir_recorder.report.costs import (
     J_PER_KWH,
     Costs,
+    IdleSaving,
     assumed_section,
     counted_with,
     cycles_of_year,
@@ -105,12 +106,8 @@ def paid_row(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     side = found.planned
     counted = year_of(found, side, costs)
     today = side.saving.common * counted.cycles_a_year
-    controller = cell.robot.controller
-    idle = None
-    line = None
-    if controller.counted:
-        idle = idle_saving(home_watts(cell, side.movements[-1].load, controller), costs)
-        line = of_saving(side.saving, costs)
+    idle = _idle(found, cell, costs)
+    line = of_saving(side.saving, costs) if cell.robot.controller.counted else None
     before = yearly_money(costs.money(today), costs.currency)
     notes = (f"today {before} a year", f"{cycles_of_year(counted.pace, costs)}, predicted")
     return Paid(counted.saved, today, idle, line, notes).html(costs)
@@ -193,14 +190,26 @@ def figure_table(found: BeforeAfter, costs: Costs) -> str:
     return table(("", *(f">{side.name}" for side in sides)), rows, "Figures")
 
 
-def change_table(found: BeforeAfter, costs: Costs) -> str:
-    """The changes that save most, the least work first."""
-    if not found.changes:
-        return '<p class="empty">No change saves as much as a joule.</p>'
+def _idle(found: BeforeAfter, cell: Cell, costs: Costs) -> IdleSaving | None:
+    """What rest saves outside of the shifts, where the controller's power is known."""
+    controller = cell.robot.controller
+    if not controller.counted:
+        return None
+    return idle_saving(home_watts(cell, found.planned.movements[-1].load, controller), costs)
+
+
+def change_table(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
+    """The changes that save most, the least work first, and the rest outside of the shifts."""
     cycles = year_of(found, found.planned, costs).cycles_a_year
     rows = [_change(k, change, cycles, costs) for k, change in enumerate(found.changes, start=1)]
+    idle = _idle(found, cell, costs)
+    if idle is not None:
+        words = f"{idle.mode} instead of brakes that are only closed"
+        price = yearly_money(idle.saved, costs.currency)
+        rows.append(("at night and at weekends", text(words), DASH, text(price)))
+    none = "" if found.changes else '<p class="empty">No change saves as much as a joule.</p>'
     heads = ("where", "what to do", ">saved a cycle", ">saved a year")
-    return table(heads, rows, "Changes")
+    return none + (table(heads, rows, "Changes") if rows else "")
 
 
 def _change(k: int, change: Change, cycles: float, costs: Costs) -> tuple[str, ...]:
@@ -416,7 +425,7 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
         "basis": basis_section(found, cell),
         "line": _line(found, cell, prices),
         "assumed": assumed_section(prices),
-        "changes": change_table(found, prices),
+        "changes": change_table(found, cell, prices),
         "hops": hop_table(found),
         "front": front_part([_point(side) for side in there], kilowatt_hours),
         "choices": "".join(_choice(side, found.towards) for side in there[1:]),
