@@ -75,7 +75,10 @@ class Judge:
         for shape in self.shapes.geometryObjects:
             if _mixed_up(shape.meshPath):
                 shape.geometry = _by_trimesh(shape.meshPath, shape.meshScale)
-            self.bodies[link.get(shape.parentJoint, 0)].append(shape)
+            joint = shape.parentJoint
+            while joint and joint not in link:  # of a joint that is not planned: what carries it
+                joint = self.model.parents[joint]
+            self.bodies[link.get(joint, 0)].append(shape)
 
     def place(self, q: np.ndarray) -> None:
         """Move everything to joint values (6,) [rad]."""
