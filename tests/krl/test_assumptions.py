@@ -115,8 +115,18 @@ ASSUMED = {
     ),
     "how far corners are rounded": (
         "PTP {A1 1} C_PTP\nPTP {A1 2}",
-        "no $APO is set: as BAS(#INITMOV) sets it, 50 % and 3 mm",
+        "$APO.CPTP isn't set: as BAS(#INITMOV) sets it, 50 %",
         Effect.SPEEDS,
+    ),
+    "how far the speed is kept in corners": (
+        "LIN_REL {X 1} C_VEL\nLIN_REL {X 2}",
+        "$APO.CVEL isn't set: as BAS(#INITMOV) sets it, 100 %",
+        Effect.SPEEDS,
+    ),
+    "where the first motion begins": (
+        "PTP $AXIS_ACT\nPTP {A1 30}",
+        "$AXIS_ACT is the first motion: the robot stands in the cell's home",
+        Effect.PLACES,
     ),
     "where it stands at first": (
         "SPTP $AXIS_ACT\nIF $AXIS_ACT.A1>5 THEN\nENDIF",

@@ -37,6 +37,7 @@ from ir_krl.run.memory import (
     Pulse,
 )
 from ir_krl.run.notes import Effect
+from ir_krl.run.standing import Standing
 from ir_krl.run.system import (
     AXES,
     DEFAULTS,
@@ -563,6 +564,7 @@ class Moving(Assigning):
     """Runs motions; what they are is built by `_motions`."""
 
     _motions: Motions
+    standing: Standing
     _triggers: list[_Trigger]
     _part: int = 0  # of the spline that is built: a TRIGGER is of the part that follows
 
@@ -602,10 +604,18 @@ class Moving(Assigning):
         self._triggers = []
         self._act(one for one in due if one.switch.ahead)
         built = self._with_settings(tree, lambda: self._motions.motion(tree))
+        self._begins(tree, built.target)
         self.commands.append(self._in_advance(built))
         self.memory.moved()
         self._signals.moved()
         self._act(one for one in due if not one.switch.ahead)
+
+    def _begins(self, tree: Tree, target: Target) -> None:
+        """Note a motion that goes from where the robot stands before anything says where."""
+        if target.relative and not self.standing.moved:
+            name = target.name or "a relative motion"
+            text = f"{name} is the first motion: the robot stands in the cell's home"
+            self.note(tree, text, Effect.PLACES)
 
     def _not_beside(self, tree: Tree) -> bool:
         """Whether a motion stands in what a TRIGGER calls: a controller doesn't take it there."""

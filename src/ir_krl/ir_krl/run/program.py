@@ -205,7 +205,6 @@ class _Run(Moving):
         self._routines = routines
         self._library = Library(memory)
         self._signals = Signals(memory, inputs, self.note_at, self._stopped)
-        self.standing: Standing
         self._running: list[Routine] = []
         self.unknown: dict[str, UnknownRoutine] = {}
         self._calling = False  # a call as a statement begins

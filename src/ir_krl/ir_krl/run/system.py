@@ -325,9 +325,11 @@ def assumed_variables(forms: FormAge = FormAge.OPEN) -> dict[str, Assumption]:
     home = "isn't in the files: the cell's home"
     found["XHOME"] = Assumption(f"XHOME {home}", Effect.PLACES)
     found["$H_POS"] = Assumption(f"$H_POS {home}", Effect.PLACES)
-    apo = "no $APO is set: as BAS(#INITMOV) sets it, 50 % and 3 mm"
     for name in ("CPTP", "CDIS", "CORI", "CVEL"):
-        found[f"$APO.{name}"] = Assumption(apo, Effect.SPEEDS)
+        delivered = f"DEF_APO_{name}"
+        apo = f"{DEFAULTS[delivered]:g} {DELIVERED[delivered]}"
+        text = f"$APO.{name} isn't set: as BAS(#INITMOV) sets it, {apo}"
+        found[f"$APO.{name}"] = Assumption(text, Effect.SPEEDS)
     path = (
         "$VEL or $ACC isn't set whole: what lacks is as BAS(#INITMOV) sets it, 2 m/s, 200 deg/s, "
         "2.3 m/s^2, 100 deg/s^2"
