@@ -41,6 +41,7 @@ BETWEEN = {
     "$ADVANCE=0": True,
     "NOBODY()": True,
     "CWRITE(H,S,M,1)": True,
+    "COPEN(:SER_3,H)": True,
     "N=N+1": False,
     "$VEL.CP=0.4": False,
     "$FLAG[2]=TRUE": False,

@@ -178,7 +178,9 @@ class Expressions:
         if sign == "*":
             return in_range(a * b, place)
         if b == 0:
-            raise KrlRunError("division by 0", place)
+            raise KrlRunError(
+                "division by 0: give what is known on the controller only, --set 'NAME=…'", place
+            )
         if isinstance(a, int) and isinstance(b, int):
             whole = abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)  # towards zero
             return in_range(whole, place)

@@ -62,7 +62,11 @@ class Array:
         """Raise KrlRunError for an index that isn't within the declared sizes."""
         written = ", ".join(map(str, index))
         if any(one < 1 for one in index):
-            raise KrlRunError(f"{name}[{written}]: the first element is [1]", place)
+            raise KrlRunError(
+                f"{name}[{written}]: the first element is [1]; give what decides the index, where "
+                "that is known on the controller only, --set 'NAME=…'",
+                place,
+            )
         if not self.sizes:
             return
         declared = ", ".join(map(str, self.sizes))
