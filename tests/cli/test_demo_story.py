@@ -18,6 +18,7 @@ from ir_cli.ros.demo import LONGEST_PAUSE, Demonstration, finish_recording, reco
 from ir_cli.ros.robots_demo import driven_together
 from ir_description import load_cell
 from ir_msgs_py.ros.client import ProgramRun
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_values.errors import CallTimedOutError, RequestRefusedError
 
 STORY = {
@@ -67,38 +68,45 @@ def test_a_demonstration_that_ends_early_says_why_and_is_reported(
     assert demonstration._story(None) == ""
 
 
-class SlowRecorder:
-    """A client whose recorder answers after some looks, or never."""
+class WaitingRecorder:
+    """A client whose recorder answers once it is let."""
 
-    def __init__(self, seconds: float) -> None:
-        self.seconds = seconds
+    def __init__(self) -> None:
+        self.let = threading.Event()
         self.asked: list[str] = []
 
     def ask(self, service: str, request: object, timeout: float) -> None:
         self.asked.append(service)
         assert timeout > 600.0
-        time.sleep(self.seconds)
-        if self.seconds > 1.0:
+        if not self.let.wait(PATIENCE):
             raise CallTimedOutError("closed")
 
 
 def test_a_recording_is_finished_however_long_it_takes_while_the_nodes_live() -> None:
     alive: list[str] = []
-    recorder = SlowRecorder(0.5)
-    finish_recording(recorder, SimpleNamespace(check=lambda only: alive.append(only)))
+    recorder = WaitingRecorder()
+
+    def look(only: str) -> None:
+        alive.append(only)
+        if len(alive) == 2:
+            recorder.let.set()
+
+    finish_recording(recorder, SimpleNamespace(check=look))
     assert recorder.asked == ["/ir_recorder/stop"]
     assert len(alive) >= 2
     assert set(alive) == {"ir_recorder.node"}  # that another has died keeps it from nothing
 
 
 def test_a_recorder_that_has_died_is_named_at_once() -> None:
+    recorder = WaitingRecorder()
+
     def dead(only: str) -> None:
         raise ProcessError("ir_recorder was killed")
 
-    begun = time.monotonic()
     with pytest.raises(ProcessError, match="ir_recorder was killed"):
-        finish_recording(SlowRecorder(30.0), SimpleNamespace(check=dead))
-    assert time.monotonic() - begun < 10.0
+        finish_recording(recorder, SimpleNamespace(check=dead))
+    assert not recorder.let.is_set()  # it was not waited for
+    recorder.let.set()
 
 
 def test_a_recording_is_finished_whatever_ends_what_is_recorded(tmp_path: Path) -> None:
@@ -115,9 +123,10 @@ def waiting(begun: threading.Event) -> Callable[..., ProgramRun]:
 
     def drive(give_up: Callable[[], bool]) -> ProgramRun:
         begun.set()
-        deadline = time.monotonic() + 60.0
+        deadline = time.monotonic() + PATIENCE
+        looks = threading.Event()
         while not give_up() and time.monotonic() < deadline:
-            time.sleep(0.005)
+            looks.wait(0.005)
         raise RequestRefusedError("canceled in step 1" if give_up() else "waited too long", -7)
 
     return drive
