@@ -8,7 +8,7 @@ stand where their programs begin, pauses and transitions are as they are.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
@@ -21,6 +21,7 @@ from ir_cli.errors import DemonstrationError
 from ir_cli.output import Progress, table
 from ir_cli.ports import UDP, free_port
 from ir_cli.ros.demo import (
+    LOOK_SECONDS,
     START_SECONDS,
     Tended,
     await_services,
@@ -232,8 +233,11 @@ def driven_together(
 
     with ThreadPoolExecutor(len(drives)) as pool:
         try:
-            for future in [pool.submit(drive, robot) for robot in drives]:
-                future.result()
+            ends = [pool.submit(drive, robot) for robot in drives]
+            while wait(ends, timeout=LOOK_SECONDS).not_done:
+                continue  # a signal that comes just before a wait doesn't end it
+            for end in ends:
+                end.result()
         except BaseException:
             stopped.set()
             raise
