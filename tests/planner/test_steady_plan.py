@@ -7,6 +7,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from ir_msgs_py.report import PlannedMovement
 from ir_planner import Planner, RequestError, SteadyPlan
 
 CELL = load_cell("flexible")
+PAGE = Path(__file__).parents[2] / "docs" / "flexible.md"
 ROUNDING = 1e-3  # s: durations are whole nanoseconds, slowed down by millionths
 SETTLED = 0.005  # of the energy: two plans of slightly different durations, each within its gap
 
@@ -147,6 +149,24 @@ def test_the_saving_names_its_baseline_and_holds_zero_only_where_it_says_so() ->
     assert saving.low <= saving.common - saving.joules <= saving.high
     assert saving.joules < saving.common < saving.on_motors
     assert "the controller's own timers" in saving.sentence
+
+
+def test_the_page_s_figures_are_those_that_are_planned() -> None:
+    plan = planned(30.0, saving=True)
+    saving = plan.saving
+    assert saving is not None
+    assert plan.cycle is not None
+    saved = saving.common - saving.joules
+    text = PAGE.read_text("utf-8")
+    for figure in (
+        f"at least 30 parts an hour | {plan.cycle.period:.2f} s | {saving.joules / 1e3:.2f} |",
+        f"own timers | {saving.common_period:.2f} s | {saving.common / 1e3:.2f} |",
+        f"always on motors | {saving.common_period:.2f} s | {saving.on_motors / 1e3:.2f} |",
+        f"{100.0 * saved / saving.common:.1f} % less ({saved / 1e3:.1f} kJ, 90 % interval "
+        f"{saving.low / 1e3:.1f} to {saving.high / 1e3:.1f} kJ)",
+        f"takes {plan.fastest:.2f} s ({3600.0 / plan.fastest:.1f} parts an hour)",
+    ):
+        assert figure in text
 
 
 def test_the_cycle_is_written_as_a_cell_that_is_planned_as_a_program() -> None:
