@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import runpy
 import shlex
@@ -209,6 +210,35 @@ def test_commands_that_docker_s_files_show_begin_with_a_command_of_the_image() -
     scripts = set(re.findall(r"[\"'](\w+) ?= ?[\w.]+:\w+", setups))
     assert len(shown) > 5
     assert set(shown) - {"bash"} <= scripts
+
+
+@pytest.mark.parametrize(("core", "code"), [("baseline", 0), ("reference", 1)])
+def test_an_image_without_a_compiled_core_fails_to_build(core: str, code: int) -> None:
+    dockerfile = (ROOT / "docker" / "Dockerfile").read_text()
+    (check,) = re.findall(r"^RUN .* python3 -c \\\n +'(.+)' \\$", dockerfile, re.MULTILINE)
+    environment = os.environ | {"IR_KERNELS": core}
+    assert subprocess.run([sys.executable, "-c", check], env=environment).returncode == code
+
+
+def test_the_image_s_first_process_becomes_the_node_that_is_named(tmp_path: Path) -> None:
+    text = (ROOT / "docker" / "entrypoint.sh").read_text()
+    for place in ("/opt/ros/jazzy/", "/ws/ros_ws/install/"):
+        assert place in text
+        (tmp_path / place[1:]).mkdir(parents=True)
+        text = text.replace(place, f"{tmp_path}{place}")
+    (tmp_path / "opt/ros/jazzy/setup.bash").write_text("export ROS=$$\n")
+    install = tmp_path / "ws/ros_ws/install"
+    (install / "local_setup.bash").write_text("export WORKSPACE=$ROS\n")
+    node = install / "lib" / "ir_planner" / "ir_planner"
+    node.parent.mkdir(parents=True)
+    node.write_text('#!/bin/bash\necho "$WORKSPACE $$ $*"\n')
+    node.chmod(0o755)
+    (tmp_path / "entrypoint.sh").write_text(text)
+    command = ["bash", str(tmp_path / "entrypoint.sh"), "ir_planner", "--ros-args"]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    sourced, own, words = said.split()
+    assert sourced == own  # the shell was replaced: signals reach the node
+    assert words == "--ros-args"
 
 
 def test_every_command_in_a_comment_of_docker_s_files_names_what_there_is() -> None:
