@@ -21,7 +21,12 @@ from ir_msgs_py.ros.rclpy_inside import PatientActionServer
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_values.errors import CallTimedOutError, RequestRefusedError, ServiceUnavailableError
+from ir_values.errors import (
+    CallGivenUpError,
+    CallTimedOutError,
+    RequestRefusedError,
+    ServiceUnavailableError,
+)
 
 TRAJECTORY = JointTrajectory(JOINT_NAMES, [0, 10**9], np.zeros((2, 6)))
 
@@ -120,6 +125,11 @@ def test_a_refusal_raises_its_sentence_and_code(client):
     assert caught.value.code == -19
     response = client.call("/ir_planner/set_cell", SetCell.Request(cell_file="mars"))
     assert response.status.code == -19
+
+
+def test_a_call_of_a_service_that_nobody_offers_can_be_given_up(client):
+    with pytest.raises(CallGivenUpError):
+        client.call("/nowhere", SetCell.Request(), timeout=PATIENCE, give_up=lambda: True)
 
 
 def test_a_service_that_nobody_offers_is_named(client):

@@ -429,7 +429,7 @@ class Client:
         try:
             return self._called(own, service, request, limit, give_up)
         finally:
-            self._executor.run(lambda: self.node.destroy_client(own))
+            self._executor.soon(lambda: self.node.destroy_client(own))
 
     def _called(
         self,
@@ -440,8 +440,15 @@ class Client:
         give_up: Callable[[], bool] | None = None,
     ) -> Any:
         """The response to a request of this client, within `limit` [s] in all."""
+
+        def given_up() -> bool:
+            return give_up is not None and give_up()
+
         deadline = time.monotonic() + limit
-        if not self._executor.wait_until(client.service_is_ready, limit):
+        self._executor.wait_until(lambda: client.service_is_ready() or given_up(), limit)
+        if given_up():
+            raise CallGivenUpError(f"the call of {service} was given up")
+        if not client.service_is_ready():
             other = self.graph.other_type(service, client.srv_type)
             raise ServiceUnavailableError(
                 f"no node offers the service {service} (waited {limit:g} s){other}"
@@ -449,7 +456,7 @@ class Client:
         future: Future = self._executor.run(lambda: client.call_async(request))
         look = float("inf") if give_up is None else LOOK
         while not self._executor.wait(future, min(look, max(0.0, deadline - time.monotonic()))):
-            if give_up is not None and give_up():
+            if given_up():
                 raise CallGivenUpError(f"the call of {service} was given up")
             if time.monotonic() >= deadline:
                 self._executor.run(lambda: client.remove_pending_request(future))

@@ -98,6 +98,10 @@ class BackgroundExecutor:
         result: T = task.result()
         return result
 
+    def soon(self, function: Callable[[], object]) -> None:
+        """Let the spinning thread call the function; nobody waits for it."""
+        self._executor.create_task(function)
+
     def wait(self, future: Future, timeout: float) -> bool:
         """Wait until the future is done; False after `timeout` [s]."""
         done = threading.Event()
