@@ -99,8 +99,8 @@ def judge(rows: Sequence[Row]) -> list[Statement]:
         left = interval(lambda x: after(float(np.mean(x))), saved, groups=programs)
         found += [
             Statement(f"energy {what}: saved at equal cycle time", "mean", *share, *count, "%"),
-            Statement(f"energy {what}: the line saves more than its PLCs and network take",
-                      "share of the line's energy", *line, *count, "%", network),
+            Statement(f"energy {what}: that is more than PLCs and network take",
+                      "share of the factory's energy", *line, *count, "%", network),
             Statement(f"energy {what}: the robots' share afterwards", f"before {robot:g} %", *left,
                       *count, "%"),
         ]  # fmt: skip
@@ -134,9 +134,9 @@ def follows(statements: Sequence[Statement]) -> str:
     return (
         f"Planned programs save {drives.value:.0f} % of the drives' energy and {mains.value:.0f} "
         f"% of the robot's at the mains. If Table I's {_shares()[ROBOT]:g} % are drives alone, a "
-        f"line saves {line.value:.1f} % ({worth} than PLCs and network take) and the robots' "
+        f"factory saves {line.value:.1f} % ({worth} than PLCs and network take) and the robots' "
         f"share becomes {left.value:.1f} %; if they are whole robots, {line_mains.value:.1f} %. "
-        f"So planning robots better is worth {least:.0f} to {most:.0f} % of a line's energy, of "
+        f"So planning robots better is worth {least:.0f} to {most:.0f} % of a factory's energy, of "
         "which the hall takes half and line stand-by 4.5 %. That other consumers stay as they "
         f"are is assumed, not measured.{around}"
     )
@@ -167,7 +167,7 @@ def draw(rows: Sequence[Row], file: Path) -> None:
             left += width
         axes.text(left + 0.5, place, f"{left:.1f}", va="center", fontsize=8)
     axes.set_yticks([1, 0], ["Table I", "planned"])
-    axes.set(xlabel="energy of the line before = 100", xlim=(0, 108))
+    axes.set(xlabel="energy of the factory before = 100", xlim=(0, 108))
     axes.legend(fontsize=7, ncols=4, loc="upper center", bbox_to_anchor=(0.5, -0.3))
     finished(figure, file)
 
@@ -188,6 +188,6 @@ EXPERIMENT = Experiment(
     follows,
     tables,
     draw=draw,
-    caption="Energy of the line before and after, if Table I counts drives alone; the numbers "
+    caption="Energy of the factory before and after, if Table I counts drives alone; the numbers "
     "are the sums.",
 )

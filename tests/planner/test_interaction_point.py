@@ -18,6 +18,7 @@ from ir_planner.configurations.ccd_search import (
     PRINTED,
     SECANT,
     InteractionSettings,
+    _Descent,
     descend,
     increments,
     shares_back,
@@ -34,6 +35,7 @@ from ir_planner.planner import Planner
 from ir_planner.request.context import Work
 from ir_planner.request.goals import parse_goal
 from ir_planner.scene.planning_scene import PlanningScene
+from ir_values.arrays import FloatArray
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 distances = st.floats(0.0201, 1.0)
@@ -43,8 +45,8 @@ def test_starts_of_eq_1_fill_the_joint_range_as_a_truncated_normal() -> None:
     low = np.array([-3.0, 0.0])
     high = np.array([3.0, 1.0])
     starts = random_starts(low, high, 20_000, "truncated_normal", np.random.default_rng(0))
-    assert (starts >= low).all()
-    assert (starts <= high).all()
+    assert (starts > low).all()  # those beyond a limit are drawn again, not put on it
+    assert (starts < high).all()
     np.testing.assert_allclose(starts.mean(axis=0), 0.5 * (low + high), atol=0.02)
     # truncated at three sigmas the deviation is 0.9866 sigma, sigma a sixth of the range
     np.testing.assert_allclose(starts.std(axis=0), 0.9866 * (high - low) / 6.0, rtol=0.02)
@@ -254,3 +256,82 @@ def test_a_budget_that_is_spent_ends_the_search(scene_of: Callable[[str], Planni
     )
     assert len(found.q) == 0
     assert spent.truncated
+
+
+def replayed(
+    q: FloatArray,
+    aimed: float,
+    reading: str,
+    threshold: FloatArray,
+    scene: PlanningScene,
+) -> tuple[float, int]:
+    """Where A2 ends that is to go from q (n,) to `aimed`, and how often it was set back."""
+    before = scene.collision.distances(q[None])[0]
+    robot = scene.cell.robot
+    at = aimed
+    for back in range(3):
+        there = q.copy()
+        there[1] = at
+        after = scene.collision.distances(there[None])[0]
+        near = (after <= threshold) & (before > threshold)
+        if not near.any():
+            return at, back
+        d = before[near]
+        end = after[near]
+        if reading == SECANT:
+            share = np.maximum(1.05 * (threshold[near] - end) / (d - end), 0.05)
+        else:
+            share = np.maximum(end / d, -1.0) if reading == PRINTED else d - end
+        at -= min(float(share.max()), 1.0) * (at - q[1])
+        at = min(max(at, float(robot.position_min[1])), float(robot.position_max[1]))
+    return float(q[1]), 3
+
+
+@pytest.mark.parametrize("reading", [SECANT, PRINTED, GAIN])
+def test_a_step_that_collides_is_set_back_twice_at_most_and_else_taken_back(
+    reading: str, scene_of: Callable[[str], PlanningScene]
+) -> None:
+    """Judge: each start by itself, by the formula of its worst pair."""
+    scene = scene_of("demo")
+    threshold = scene.thresholds(0.02, "lathe_work")
+    robot = scene.cell.robot
+    rng = np.random.default_rng(0)
+    starts = random_starts(robot.position_min, robot.position_max, 400, "uniform", rng)
+    value = rng.uniform(robot.position_min[1], robot.position_max[1], len(starts))
+    pose = np.array(scene.station("lathe_work").pose)
+    descent = _Descent(pose, scene, threshold, InteractionSettings(set_back=reading))
+    distance = scene.collision.distances(starts)
+    found = descent._stepped(starts.copy(), 1, value.copy(), distance)[0]
+    ends = set()
+    for q, aimed, got in zip(starts, value.tolist(), found, strict=True):
+        expected, back = replayed(q, aimed, reading, threshold, scene)
+        ends.add(back)
+        assert got[1] == pytest.approx(expected, abs=1e-12)
+    assert {0, 3} < ends
+
+
+def test_a_start_is_given_up_after_three_sweeps_in_a_row_without_gain(
+    scene_of: Callable[[str], PlanningScene],
+) -> None:
+    """Judge: Psi of eq. (2) of every sweep."""
+    scene = scene_of("demo")
+    robot = scene.cell.robot
+    rng = np.random.default_rng(1)
+    starts = random_starts(robot.position_min, robot.position_max, 60, "uniform", rng)
+    pose = np.array(scene.station("lathe_work").pose)
+    threshold = scene.thresholds(0.02, "lathe_work")
+    asked = InteractionSettings(sweeps=30, newton_steps=0)
+    work = Work(10_000, np.inf, lambda: 0.0)
+    found = descend(pose, starts, scene, threshold, asked, work)
+    given_up = 0
+    for track, outcome in zip(found.tracks, found.outcome, strict=True):
+        if outcome.startswith("set back for good"):
+            tcp = scene.chain.tcp_poses(track)
+            place = ((tcp[:, :3, 3] - pose[:3, 3]) ** 2).sum(axis=1)
+            turn = ((tcp[:, :3, :3] - pose[:3, :3]) ** 2).sum(axis=(1, 2))
+            psi = place + 0.125 * turn
+            left = psi[1:] / psi[:-1]
+            assert len(left) >= 3
+            assert (left[-3:] > 0.98).all()
+            given_up += 1
+    assert given_up > 5

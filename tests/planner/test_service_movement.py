@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from ir_description import Body, Cell, PowerData, load_cell
+from ir_kernels import CollisionModel
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner.checks.evaluation import evaluate_trajectory
@@ -114,6 +115,81 @@ def test_the_modified_ga_leaves_over_certified_steps_while_d_grows(
         total = problem.area.total_distance(path)
         assert total[-1] > total[0]
         assert problem.area.zone_distance(path[-1:])[0] > 0.02
+
+
+@pytest.fixture
+def walker(demo_scene: PlanningScene) -> _Walker:
+    """Before its first generation."""
+    problem = problem_at(demo_scene, "lathe_work", a_budget())
+    return _Walker(problem, ModifiedGa(), np.random.default_rng(3))
+
+
+def alone(walker: _Walker, total: float = 1.0, sigma: float = 0.2) -> ExitPopulation:
+    """A population of the interaction configuration."""
+    return ExitPopulation(
+        walker.nodes[0][None],
+        np.array([total]),
+        np.array([sigma]),
+        np.full((1, 6), 0.1),
+        np.zeros(1, dtype=np.int64),
+        np.zeros(1, dtype=bool),
+    )
+
+
+def test_the_spread_of_eq_7_shrinks_with_the_relative_gain_of_d_and_grows_where_d_was_lost(
+    walker: _Walker,
+) -> None:
+    total = np.array([0.0, 0.9, 1.0, 1.1, 1.25, 3.0])
+    q = np.repeat(walker.nodes[0][None], len(total), axis=0)
+    children = walker._children(alone(walker), q, np.zeros(len(q), dtype=np.int64), total)
+    assert children.sigma == pytest.approx([0.26, 0.24, 0.2, 0.16, 0.1, 0.05])
+
+
+def test_where_all_offspring_collide_eq_7_looks_one_radian_around(
+    walker: _Walker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def none_free(q: Any, owner: Any, count: int) -> Any:
+        return q[:0], owner[:0], np.ones(count, dtype=bool)
+
+    monkeypatch.setattr(walker, "_free", none_free)
+    again = walker._next(alone(walker), 6)
+    assert again.sigma == pytest.approx([1.0])
+    assert not again.step.any()
+    assert again.stuck.all()
+    assert np.array_equal(again.q, walker.nodes[0][None])
+
+
+def test_a_way_out_counts_only_where_d_has_grown(walker: _Walker) -> None:
+    out = np.repeat(walker.scene.cell.park[None], 2, axis=0)
+    children = walker._children(
+        alone(walker),
+        out,
+        np.zeros(2, dtype=np.int64),
+        walker.first_total * np.array([0.9, 1.1]),
+    )
+    assert len(walker._finished(children)) == 0
+    assert len(walker.walk.paths) == 1
+    assert walker.walk.rejected["outside, but D did not grow"] == 1
+
+
+def test_link_3_in_the_zone_is_not_outside(demo_scene: PlanningScene) -> None:
+    """Judge: a model of the capsules of links 3 and 4 alone, and one of those behind."""
+    area = WorkArea.of(demo_scene, demo_scene.station("lathe_work"))
+    assert area.zone is not None
+    box = [Body("zone", "box", area.zone.pose, area.zone.size)]
+    robot = demo_scene.cell.robot
+    capsules = [*robot.capsules, *(one for load in demo_scene.loads for one in load.capsules)]
+    q = np.random.default_rng(0).uniform(robot.position_min, robot.position_max, (4000, 6))
+    arm, tool = (
+        CollisionModel(demo_scene.chain, [c for c in capsules if c.link in links], box, ())
+        .min_distance(q)
+        .distance
+        for links in ((3, 4), range(5, 9))
+    )
+    inside = (arm <= 0.02) & (tool > 0.02)
+    assert inside.any()
+    assert not area.left(q[inside], 0.02).any()
+    assert np.array_equal(area.left(q, 0.02), (arm > 0.02) & (tool > 0.02))
 
 
 @pytest.mark.parametrize("stuck", [False, True])

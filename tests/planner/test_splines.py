@@ -147,6 +147,11 @@ def test_shares_of_a_path_are_interpolated_joint_by_joint(
     assert at_shares(path, shares) == pytest.approx(np.stack(expected, axis=1), abs=1e-12)
 
 
+def test_virtual_knots_halve_the_first_and_the_last_interval() -> None:
+    assert virtual_knots(np.array([0.0, 1.0, 3.0, 7.0])).tolist() == [0.0, 0.5, 1.0, 3.0, 5.0, 7.0]
+    assert virtual_knots(np.array([1.0, 4.0])).tolist() == [1.0, 2.0, 3.0, 4.0]
+
+
 def test_times_that_do_not_increase_are_refused() -> None:
     with pytest.raises(ValueError, match="increase"):
         spline_through(

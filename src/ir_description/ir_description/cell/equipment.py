@@ -39,7 +39,7 @@ SAMPLES_MAX = 10_000
 class Zone:
     """A forbidden zone: an oriented box, pose (4, 4) of its centre and full size (3,) [m].
 
-    The kind changes how a withdrawal is searched, not what the zone is.
+    The kind is a name for pages and studies: it changes neither the zone nor a search.
     """
 
     kind: ZoneKind
