@@ -29,7 +29,7 @@ from ir_description import (
     robot_marks,
 )
 from ir_kernels.dynamics import DynamicsModel
-from ir_sim_driver.load_check import Declared, LoadFinding, Motion, Uncertainty, weighed
+from ir_sim_driver.load_check import Declared, LoadFinding, NotedMotion, Uncertainty, weighed
 from ir_sim_driver.plant import Carried, Plant, nominal_plant, typical_plant
 from ir_values.arrays import FloatArray
 
@@ -278,7 +278,7 @@ def _weighed(
     cell: Cell,
 ) -> LoadFinding:
     torque = _torque(plant, movement, carried, cell) + _holding(plant, movement)
-    found = weighed(Motion(*movement, torque), Declared(declared, robot), THRESHOLD)
+    found = weighed(NotedMotion(*movement, torque), Declared(declared, robot), THRESHOLD)
     assert found is not None  # there is gravity
     return found
 

@@ -97,9 +97,9 @@ class Robot:
                 return status
             answer = self._fulfilled(request)
 
-    def _outcome(self, status: Status, modes: tuple[Any, ...]) -> ask.Outcome:
+    def _outcome(self, status: Status, modes: tuple[Any, ...]) -> ask.RequestOutcome:
         plant = self.plant
-        return ask.Outcome(plant.time, plant.modes.mode, status, modes, plant.mains.energy())
+        return ask.RequestOutcome(plant.time, plant.modes.mode, status, modes, plant.mains.energy())
 
     def _fulfilled(self, request: ask.Request) -> tuple[Status, tuple[Any, ...]]:  # noqa: C901
         plant = self.plant

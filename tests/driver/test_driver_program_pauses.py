@@ -54,7 +54,7 @@ class Plant:
             while True:
                 status, modes = self.fulfil(request)
                 plant = self.plant
-                outcome = ask.Outcome(
+                outcome = ask.RequestOutcome(
                     plant.time, plant.modes.mode, status, modes, plant.mains.energy()
                 )
                 request = steps.send(outcome)

@@ -20,7 +20,7 @@ from ir_sim_driver import (
     make_simulation,
 )
 from ir_sim_driver.controller.outputs import report
-from ir_sim_driver.load_check import Declared, Motion, Uncertainty, weighed
+from ir_sim_driver.load_check import Declared, NotedMotion, Uncertainty, weighed
 from ir_sim_driver.notices import Level
 from ir_sim_driver.plant import carried
 from ir_values.arrays import FloatArray
@@ -147,7 +147,9 @@ def test_the_estimated_mass_is_as_uncertain_as_it_says() -> None:
         other = DynamicsModel(
             drawn.robot_with(CELL.robot), drawn.loads_with(load.loads), CELL.base_pose
         )
-        finding = weighed(Motion(q, qd, qdd, other.inverse_dynamics(q, qd, qdd)), declared, 3.0)
+        finding = weighed(
+            NotedMotion(q, qd, qdd, other.inverse_dynamics(q, qd, qdd)), declared, 3.0
+        )
         assert finding is not None
         z.append(finding.mass / finding.mass_deviation)
     assert np.abs(z).max() < 3.0

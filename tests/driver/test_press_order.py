@@ -18,9 +18,10 @@ from rclpy.serialization import serialize_message
 from ir_msgs.msg import PlcInputs
 from ir_msgs_py.modes import Mode
 from ir_sim_driver.controller.mode_control import Latches
+from ir_sim_driver.emergency_stop import StopState
 from ir_sim_driver.node import presses
 from ir_sim_driver.notices import Notices
-from ir_sim_driver.plc import Plc, PlcSettings, StopState
+from ir_sim_driver.plc import Plc, PlcSettings
 
 STEP = 0.004  # s
 CASES = 300

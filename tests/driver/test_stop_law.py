@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from ir_msgs_py.modes import READY, Mode
-from ir_sim_driver.plc import StopState
+from ir_sim_driver.emergency_stop import StopState
 
 sys.path.insert(0, str(Path(__file__).parent))  # benchmarks/hostile.py reads this file too
 from stop_core import Core

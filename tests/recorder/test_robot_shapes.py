@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ir_description import Capsule, load_robot
-from ir_recorder.report.shapes import Mesh, Part, lathe, robot_parts
+from ir_recorder.report.shapes import Mesh, SurfacePart, lathe, robot_parts
 from ir_values.arrays import FloatArray
 
 RIM = 0.13  # m: ends of beams, the counterbalance's pivot aside
@@ -14,7 +14,7 @@ ROBOT = load_robot()
 PARTS = robot_parts(ROBOT)
 
 
-def volume(part: Part) -> float:
+def volume(part: SurfacePart) -> float:
     mesh = part.mesh
     a, b, c = (mesh.points[mesh.triangles[:, k]] for k in range(3))
     return float(np.einsum("ti,ti->t", a, np.cross(b, c)).sum() / 6.0)
@@ -33,10 +33,10 @@ def test_every_capsule_has_a_piece_and_every_link_one() -> None:
 
 
 @pytest.mark.parametrize("part", PARTS, ids=lambda part: f"{part.kind} of link {part.link}")
-def test_pieces_are_closed_and_seen_from_outside(part: Part) -> None:
+def test_pieces_are_closed_and_seen_from_outside(part: SurfacePart) -> None:
     """By the divergence theorem, from two origins: an open surface would give two volumes."""
     mesh = part.mesh
-    moved = Part(part.link, part.kind, Mesh(mesh.points + 1.0, mesh.normals, mesh.triangles))
+    moved = SurfacePart(part.link, part.kind, Mesh(mesh.points + 1.0, mesh.normals, mesh.triangles))
     assert volume(part) > 1e-4
     assert volume(moved) == pytest.approx(volume(part), rel=1e-6)
     assert np.isfinite(part.mesh.normals).all()
@@ -58,4 +58,4 @@ def test_pieces_lie_within_the_capsules_but_for_their_rims(capsule: Capsule) -> 
 
 def test_a_turned_profile_has_the_volume_of_its_cone() -> None:
     cone = lathe(np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 3.0)]))
-    assert volume(Part(0, "link", cone)) == pytest.approx(np.pi, rel=0.02)
+    assert volume(SurfacePart(0, "link", cone)) == pytest.approx(np.pi, rel=0.02)

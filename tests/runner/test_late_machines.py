@@ -56,7 +56,7 @@ class World:
             while True:
                 self.fulfil(request)
                 request = program.send(
-                    ask.Outcome(self.now, Mode.STAND_ON_MOTORS, Status.success())
+                    ask.RequestOutcome(self.now, Mode.STAND_ON_MOTORS, Status.success())
                 )
         except StopIteration as ended:
             self.executed = ended.value.executed

@@ -70,7 +70,7 @@ class World:
                     continue
                 status, modes = self.fulfil(request)
                 request = steps.send(
-                    ask.Outcome(self.now, self.heard, status, modes, self.watts * self.now)
+                    ask.RequestOutcome(self.now, self.heard, status, modes, self.watts * self.now)
                 )
         except StopIteration as ended:
             return ended.value

@@ -137,7 +137,7 @@ class Fulfilment:
         )
         return Status(StatusCode.INVALID_ROBOT_STATE, sentence)
 
-    async def _outcome(self, request: ask.Request) -> ask.Outcome:
+    async def _outcome(self, request: ask.Request) -> ask.RequestOutcome:
         ports = self._ports
         modes: tuple[PowerMode, ...] = ()
         if isinstance(request, ask.INTERRUPTIBLE) and self._stop():
@@ -148,7 +148,7 @@ class Fulfilment:
             status, modes = await ports.driver.query_modes()
         else:
             status = await self._fulfil(request)
-        return ask.Outcome(
+        return ask.RequestOutcome(
             ports.driver.plant_time, ports.driver.mode, status, modes, ports.driver.energy
         )
 

@@ -24,9 +24,9 @@ from ir_program_runner.requests import (
     Begin,
     Done,
     Drive,
-    Outcome,
     Phase,
     Request,
+    RequestOutcome,
     SendWakePacket,
     SetLoad,
     SetPlcInput,
@@ -151,7 +151,7 @@ def _check_gap(where: str, before: PlannedMovement, movement: PlannedMovement) -
 # the controller reacts to nothing but a Wake-on-LAN packet; the HIB bit is cleared when it is
 # back.
 
-Requests = Generator[Request, Outcome, Outcome]
+Requests = Generator[Request, RequestOutcome, RequestOutcome]
 _ASLEEP = (Mode.TO_HIBERNATION, Mode.HIBERNATION)
 _AWAKE = (Mode.FROM_HIBERNATION, *READY, Mode.STAND_ON_BRAKES)
 _ROUNDING = 1e-6  # s; a plan may use the shortest pause exactly
@@ -184,7 +184,7 @@ class Pause:
         self._mode = Mode.STAND_ON_MOTORS  # the deepest that was asked for
         self.restarted = False  # whether the controller has hibernated
 
-    def run(self) -> Generator[Request, Outcome, str]:
+    def run(self) -> Generator[Request, RequestOutcome, str]:
         """Spend the pause; raises StepFailedError when the robot isn't ready in the end."""
         begun = yield Phase("pause")
         end = begun.now + self._duration
@@ -232,7 +232,9 @@ class Pause:
             "was planned for other timers, powers or loads than the driver's"
         )
 
-    def _rest(self, end: float, times: Sequence[PowerMode]) -> Generator[Request, Outcome, str]:
+    def _rest(
+        self, end: float, times: Sequence[PowerMode]
+    ) -> Generator[Request, RequestOutcome, str]:
         """Enter the modes one after the other and stay until it is time to wake."""
         wake_at = end - times[-1].regular_time_to_operate
         stay = 0.0
@@ -290,7 +292,7 @@ class Pause:
             need((yield TakeBack(_BIT[self._mode])))
         return ready
 
-    def _wake_by_packets(self, outcome: Outcome, limit: float) -> Requests:
+    def _wake_by_packets(self, outcome: RequestOutcome, limit: float) -> Requests:
         """Send packets until the controller starts; one may get lost, or come before it sleeps."""
         if outcome.mode not in _ASLEEP:  # it has not hibernated, or that is heard late
             outcome = yield from self._stay_awake()
@@ -322,7 +324,7 @@ class Pause:
             raise StepFailedError(status)
         return outcome
 
-    def _clear(self) -> Generator[Request, Outcome, None]:
+    def _clear(self) -> Generator[Request, RequestOutcome, None]:
         """After a cancel or a fault: clear the bit of the pause, without waiting for the robot.
 
         A controller that hibernates is woken; its HIB bit counts no more then and is cleared when a
@@ -343,7 +345,7 @@ class Pause:
 # One step: wait for its signals, carry its load, move or pause, attach or detach, set its
 # signals.
 
-Steps = Generator[Request, Outcome, None]
+Steps = Generator[Request, RequestOutcome, None]
 STARTING_MODES = (Mode.STAND_ON_MOTORS, Mode.STAND_ON_BRAKES)
 _LOAD_RETRY = 0.1  # s: a robot settles within some tenths
 
@@ -377,7 +379,7 @@ class Program:
         self._begins = [0.0, *accumulate(movement.duration for movement in movements)]
         self._set: dict[str, tuple[float, float]] = {}
 
-    def run(self) -> Generator[Request, Outcome, ProgramResult]:
+    def run(self) -> Generator[Request, RequestOutcome, ProgramResult]:
         """Run all steps; ends early with the status of the step that failed, or PREEMPTED."""
         total = len(self._movements)
         try:
@@ -414,7 +416,9 @@ class Program:
         for bit in ("ab", "hib"):
             need((yield TakeBack(bit)))
 
-    def _step(self, index: int, movement: PlannedMovement) -> Generator[Request, Outcome, str]:
+    def _step(
+        self, index: int, movement: PlannedMovement
+    ) -> Generator[Request, RequestOutcome, str]:
         """Do one step; it counts as started when its signals are there and as ended before its load
         and signals follow: waiting for answers is no part of its energy.
         """

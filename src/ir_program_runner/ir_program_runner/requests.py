@@ -1,7 +1,7 @@
 """Requests of a program to driver, planner and machines, one at a time, and their answers.
 
 The program never waits, sends or looks at a clock itself: it yields a request and is sent an
-Outcome.
+RequestOutcome.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ INTERRUPTIBLE = (WaitForSignals, WaitForMode, WaitUntil, Drive)
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RequestOutcome:
     """What came of a request.
 
     now: a steady clock [s]. mode: the power mode, None before it is known. modes: the answer to
@@ -159,7 +159,7 @@ class Outcome:
     energy: float = 0.0
 
 
-def need(outcome: Outcome) -> Outcome:
+def need(outcome: RequestOutcome) -> RequestOutcome:
     """Return the outcome, or end the step with its status."""
     if not outcome.status.ok:
         raise StepFailedError(outcome.status)

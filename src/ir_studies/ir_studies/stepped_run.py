@@ -94,7 +94,9 @@ class SteppedRun:
                 status, modes = self._fulfil(request)
                 plant = self.simulation
                 request = steps.send(
-                    ask.Outcome(plant.time, plant.modes.mode, status, modes, plant.mains.energy())
+                    ask.RequestOutcome(
+                        plant.time, plant.modes.mode, status, modes, plant.mains.energy()
+                    )
                 )
         except StopIteration as ended:
             result: ProgramResult = ended.value

@@ -30,7 +30,7 @@ from ir_msgs_py import names
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.plc import magic_packet, send_packet
 from ir_msgs_py.report import MovementKind, PlannedMovement
-from ir_msgs_py.ros.client import Client, ProgramPlan
+from ir_msgs_py.ros.client import Client, ProgramAnswer
 from ir_msgs_py.savings import one_sided
 from ir_planner import Goal, Planner
 from ir_program_runner.settings import LinkSettings
@@ -393,7 +393,7 @@ class Demonstration:
             )
         return [f"{key}={value}" for key, value in facts.items()]
 
-    def _plan(self, client: Client) -> ProgramPlan:
+    def _plan(self, client: Client) -> ProgramAnswer:
         self._progress.begin("plan the program")
         plan = client.plan_program(
             options=self._options,

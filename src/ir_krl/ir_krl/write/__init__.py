@@ -10,7 +10,7 @@ from ir_krl.write.numbering import (
     tool_numbers,
 )
 from ir_krl.write.plc import PlcPause, plc_input, plc_table, read_plc_table, structured_text
-from ir_krl.write.program import (
+from ir_krl.write.program_text import (
     GRIP,
     PLC_DONE,
     PLC_PAUSE,

@@ -249,7 +249,7 @@ class GoalSender:
 
 
 @dataclass(frozen=True, eq=False)
-class MovementPlan:
+class MovementAnswer:
     """A planned movement; trajectory is None unless the options asked for points."""
 
     trajectory_id: str
@@ -258,7 +258,7 @@ class MovementPlan:
     info: PlanningInfo
 
     @classmethod
-    def from_msg(cls, response: Any) -> MovementPlan:
+    def from_msg(cls, response: Any) -> MovementAnswer:
         """From the response of plan_regional_movement, plan_trajectory or plan_escape."""
         points = response.trajectory
         return cls(
@@ -301,7 +301,7 @@ class OptimizedTrajectory:
 
 
 @dataclass(frozen=True, eq=False)
-class ProgramPlan:
+class ProgramAnswer:
     """A planned program: its steps, the report of the whole, and what it saves; gap [%]: how far
     above the best chain of configurations it can be. front: programs by cycle time, where they were
     asked for.
@@ -316,7 +316,7 @@ class ProgramPlan:
     front: tuple[ProgramPoint, ...]
 
     @classmethod
-    def from_msg(cls, result: Any) -> ProgramPlan:
+    def from_msg(cls, result: Any) -> ProgramAnswer:
         """From the result of the plan action or the response of plan_program."""
         return cls(
             result.program_id,
@@ -539,7 +539,7 @@ class Client:
         response = self.ask(names.SET_CELL, request, timeout=max(self.timeout, 30.0))
         return tuple(station.name for station in response.stations)
 
-    def plan_to(self, goal: str, options: PlanOptions | None = None) -> MovementPlan:
+    def plan_to(self, goal: str, options: PlanOptions | None = None) -> MovementAnswer:
         """Plan a movement from where the robot is to a goal as it is typed: "lathe", "A1 0 A2 -90
         ...".
         """
@@ -548,16 +548,18 @@ class Client:
         response = self.ask(
             names.PLAN_REGIONAL_MOVEMENT, request, self.timeout + chosen.planning_time
         )
-        return MovementPlan.from_msg(response)
+        return MovementAnswer.from_msg(response)
 
-    def plan_escape(self, *, station: str = "", options: PlanOptions | None = None) -> MovementPlan:
+    def plan_escape(
+        self, *, station: str = "", options: PlanOptions | None = None
+    ) -> MovementAnswer:
         """Plan a slow way from where the robot stands too near to something, in it or beyond a
         limit; no trajectory_id where it stands free. station: its allowed contacts hold.
         """
         chosen = options or PlanOptions()
         request = PlanEscape.Request(station=station, options=plan_options_to_msg(chosen))
         response = self.ask(names.PLAN_ESCAPE, request, self.timeout + chosen.planning_time)
-        return MovementPlan.from_msg(response)
+        return MovementAnswer.from_msg(response)
 
     def optimize(
         self, trajectory: JointTrajectory | str, options: PlanOptions | None = None
@@ -581,7 +583,7 @@ class Client:
         timeout: float = 600.0,
         savings: bool = True,
         front_points: int = 0,
-    ) -> ProgramPlan:
+    ) -> ProgramAnswer:
         """Plan a program over stations (none: the cell's own); progress gets the action's feedback.
         savings: hold it against the common program; front_points: programs from the shortest cycle
         time to twice the free one.
@@ -595,7 +597,7 @@ class Client:
         )
         result = self.send_goal(names.PLAN, goal, progress, timeout)
         _check(names.PLAN, result)
-        return ProgramPlan.from_msg(result)
+        return ProgramAnswer.from_msg(result)
 
     def get_trajectory(self, trajectory_id: str) -> JointTrajectory:
         """Fetch the points of a planned trajectory."""

@@ -19,7 +19,7 @@ from ir_planner.checks import (
     standing_slope,
 )
 from ir_planner.scene import PlanningScene
-from ir_values.arrays import FloatArray
+from ir_values.arrays import BoolArray, FloatArray
 
 # The modes that a robot can rest in at a posture, and what a sequence of them costs.
 #
@@ -122,7 +122,7 @@ class Rests:
         """Energy [J] from the start of a pause [s] until the robot is ready, when its end wakes the
         robot, and how late that is [s].
         """
-        reached = tuple(step for step in self._with_timer(steps) if step.at < pause)
+        reached = tuple(step for step in self._with_timer(steps) if not over_by(step.at, pause))
         if not reached:
             return self.motors * pause, 0.0
         last = reached[-1]
@@ -133,9 +133,9 @@ class Rests:
         """Mean of the energies [J] of `cost` over pauses (n,) [s]."""
         timed = self._with_timer(steps)
         ends = [*(step.at for step in timed), np.inf]
-        total = self.motors * float(pauses[pauses <= ends[0]].sum())
+        total = self.motors * float(pauses[over_by(ends[0], pauses)].sum())
         for k, step in enumerate(timed):
-            ended = pauses[(pauses > step.at) & (pauses <= ends[k + 1])]
+            ended = pauses[over_by(ends[k + 1], pauses) & ~over_by(step.at, pauses)]
             total += float(self._energy(timed[: k + 1], np.maximum(ended, step.free)).sum())
         return total / len(pauses)
 
@@ -215,6 +215,14 @@ class Rests:
                 if step.rest != brakes.rest
             ),
         )
+
+
+def over_by(switch: float, pauses: float | FloatArray) -> BoolArray:
+    """Whether pauses [s] are over at a switch time [s]: one that ends at that instant is not
+    switched any more.
+    """
+    over: BoolArray = np.less_equal(pauses, switch)
+    return over
 
 
 def cut_at(steps: Steps) -> float | None:

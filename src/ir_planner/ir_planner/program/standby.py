@@ -22,6 +22,7 @@ from ir_planner.program.pauses import (
     at_once,
     bus_is_off,
     mode_watts,
+    over_by,
     pause_slope,
     recharge_of,
     rests_at,
@@ -175,9 +176,9 @@ class Timeouts:
         """The first mode and its switch time; none: no pause outlasts standing on motors."""
         rests = self.rests
         lengths = self.lengths
-        times = np.concatenate(([0.0], lengths[lengths <= rests.timer]))
+        times = np.concatenate(([0.0], lengths[over_by(rests.timer, lengths)]))
         best = float("inf"), Steps()
-        if lengths[-1] <= rests.timer:
+        if over_by(rests.timer, lengths[-1]):
             best = self._until(np.array([lengths[-1]]), rests.motors, 0.0)[0], Steps()
         for rest in rests.modes:
             at = np.append(times, rests.timer) if rest.name == BRAKES else times
@@ -212,7 +213,7 @@ class Timeouts:
         return np.concatenate(([0.0], np.cumsum(self.lengths)))
 
     def _ended_by(self, times: FloatArray) -> FloatArray:
-        """How many pauses end at each time or before."""
+        """How many pauses are over by each time, by the rule of `over_by`."""
         return np.searchsorted(self.lengths, times, side="right").astype(np.float64)
 
     def _going_on_after(self, times: FloatArray) -> FloatArray:

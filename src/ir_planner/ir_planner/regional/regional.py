@@ -26,6 +26,7 @@ from ir_planner.regional.in_motion import search_in_motion
 from ir_planner.regional.no_path import barrier, enclosure
 from ir_planner.regional.safeguards import (
     DIRECT,
+    Answer,
     Exploration,
     best_found,
     not_worse_than_baseline,
@@ -191,7 +192,7 @@ def _search_timed(
     return _search(start, goals, context, searches)
 
 
-def _search(  # noqa: C901
+def _search(
     start: FloatArray, goals: FloatArray, context: Context, searches: Searches
 ) -> tuple[Status, Movement | None]:
     """The best synchronous movement found."""
@@ -202,25 +203,10 @@ def _search(  # noqa: C901
     blocked = blocked or end_outside_cone(start, ends.goals[0], cone)
     if blocked is not None:
         return blocked, None
-    paths = first_paths(ends, space, context, searches, briefly=True)
-    if not paths and context.options.planner_id == "" and not context.work.exhausted:
-        proved = _impossible(ends, space, context)
-        if proved is not None:
-            return proved, None
-    paths = paths or first_paths(ends, space, context, searches, briefly=False)
-    if not paths:
-        return refusal(start, ends.goals[0], space, context.journal, path=False), None
-    there = np.abs(ends.goals - start).max(axis=1).min() < STILL
-    best = None
-    shortest = np.inf
-    if not there and context.options.planner_id != DIRECT:
-        best, shortest = best_found(Exploration(ends, paths, space, searches), context)
-    if context.options.planner_id == "" and not there:
-        best = not_worse_than_baseline(best, paths, context)
-    if best is None:
-        if np.isfinite(shortest):
-            check_requested(shortest, context)
-        best = _in_straight_steps(paths, Portfolio(space, Refinement(context)), context)
+    paths = _free_paths(ends, space, context, searches)
+    if isinstance(paths, Status):
+        return paths, None
+    best = _cheapest(Exploration(ends, paths, space, searches), context)
     if best is None:
         return refusal(start, ends.goals[0], space, context.journal, path=True), None
     context.journal.planner_id, movement = best
@@ -228,6 +214,40 @@ def _search(  # noqa: C901
     if context.options.objective == "movement_cost":  # W of its waypoints is asked for
         movement = over_free_steps(movement, space)
     return Status.success(), movement
+
+
+def _free_paths(
+    ends: Ends, space: FreeSpace, context: Context, searches: Searches
+) -> list[Path] | Status:
+    """Free paths from the start to goals; a status where there are none, or none was found."""
+    paths = first_paths(ends, space, context, searches, briefly=True)
+    if not paths and context.options.planner_id == "" and not context.work.exhausted:
+        proved = _impossible(ends, space, context)
+        if proved is not None:
+            return proved
+    paths = paths or first_paths(ends, space, context, searches, briefly=False)
+    return paths or refusal(ends.start, ends.goals[0], space, context.journal, path=False)
+
+
+def _cheapest(exploration: Exploration, context: Context) -> Answer | None:
+    """The cheapest movement that the paths lead to: optimised, along a straight segment, or in
+    straight steps, in this order of what is found. None where none is certified.
+    """
+    ends = exploration.ends
+    planner_id = context.options.planner_id
+    there = np.abs(ends.goals - ends.start).max(axis=1).min() < STILL
+    best = None
+    shortest = np.inf
+    if not there and planner_id != DIRECT:
+        best, shortest = best_found(exploration, context)
+    if not there and planner_id == "":
+        best = not_worse_than_baseline(best, exploration.paths, context)
+    if best is not None:
+        return best
+    if np.isfinite(shortest):
+        check_requested(shortest, context)
+    portfolio = Portfolio(exploration.space, Refinement(context))
+    return _in_straight_steps(exploration.paths, portfolio, context)
 
 
 def _impossible(ends: Ends, space: FreeSpace, context: Context) -> Status | None:

@@ -57,39 +57,66 @@ def best_found(exploration: Exploration, context: Context) -> tuple[Answer | Non
     """The best answer by the searches and descents of the request and of its companions, and the
     shortest duration [s] met where none is as short as requested.
     """
-    options = context.options
     own = _explored(exploration, context)
+    if context.options.planner_id:
+        return own.best(), own.refinement.shortest
+    if context.options.duration > 0.0:
+        return _of_duration(own, exploration, context)
+    return _of_free_duration(own, exploration, context)
+
+
+def _of_free_duration(
+    own: Portfolio, exploration: Exploration, context: Context
+) -> tuple[Answer | None, float]:
     best = own.best()
     shortest = own.refinement.shortest
-    if options.planner_id:
-        return best, shortest
-    if options.duration > 0.0 and best is not None:
+    if context.options.objective == "time":
+        best, fastest = _with_faster(best, own, exploration, context)
+        shortest = min(shortest, fastest)
+    return _held_against_others(best, exploration, context), shortest
+
+
+def _of_duration(
+    own: Portfolio, exploration: Exploration, context: Context
+) -> tuple[Answer | None, float]:
+    """The cheapest of the requested duration: by its own descents where they meet it, else a
+    movement of free duration, else the fastest there is, stretched.
+    """
+    work = context.work
+    best = own.best()
+    shortest = own.refinement.shortest
+    if best is not None:
         method, path = exploration.paths[0]
-        if not (context.work.exhausted or np.array_equal(best[1].path, path)):
+        if not (work.exhausted or np.array_equal(best[1].path, path)):
             own.refine_anew(method, path)
         best = own.best()
         shortest = own.refinement.shortest
         if not np.isfinite(shortest):  # there is time for least energy
-            if not context.work.exhausted:
+            if not work.exhausted:
                 own.refine_exactly()
             return own.best(), shortest
-    if options.duration > 0.0:
-        free = _optimised_again(own, context.asking("time_and_energy"))
-        best, duration = _with_others(best, [free], context)
-        shortest = min(shortest, duration)
-        if duration <= options.duration:
-            return best, shortest
-        own = _explored(exploration, context.asking("time"))  # there is no time for least cost
-        best, duration = _with_others(best, [own.best()], context)
-        shortest = min(shortest, duration)
-    if options.duration > 0.0 or options.objective == "time":
-        turning = _optimised_again(own, context.asking("movement_cost"))
-        hurried = _hurried(own.best(), exploration, context.asking("time"))
-        best, duration = _with_others(best, [turning, hurried], context)
-        shortest = min(shortest, duration)
-    if options.duration <= 0.0:
-        best = _held_against_others(best, exploration, context)
-    return best, shortest
+
+    free = _optimised_again(own, context.asking("time_and_energy"))
+    best, duration = _with_others(best, [free], context)
+    shortest = min(shortest, duration)
+    if duration <= context.options.duration:
+        return best, shortest
+
+    hasty = _explored(exploration, context.asking("time"))  # there is no time for least cost
+    best, duration = _with_others(best, [hasty.best()], context)
+    best, fastest = _with_faster(best, hasty, exploration, context)
+    return best, min(shortest, duration, fastest)
+
+
+def _with_faster(
+    best: Answer | None, own: Portfolio, exploration: Exploration, context: Context
+) -> tuple[Answer | None, float]:
+    """The cheapest of an answer and of the fast movements that other costs lead to, and the
+    shortest of these [s].
+    """
+    turning = _optimised_again(own, context.asking("movement_cost"))
+    hurried = _hurried(own.best(), exploration, context.asking("time"))
+    return _with_others(best, [turning, hurried], context)
 
 
 def _held_against_others(

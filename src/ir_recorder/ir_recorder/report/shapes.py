@@ -162,7 +162,7 @@ _SQUARE = 3.2  # exponent of the beam's section: between an ellipse (2) and a re
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class SurfacePart:
     """A piece of a link: kind is "base", "link" or "joint"."""
 
     link: int
@@ -170,24 +170,24 @@ class Part:
     mesh: Mesh
 
 
-def robot_parts(robot: RobotModel) -> tuple[Part, ...]:
+def robot_parts(robot: RobotModel) -> tuple[SurfacePart, ...]:
     """All pieces, each in the frame of its link."""
     parts = [_of_capsule(robot, capsule) for capsule in robot.capsules]
     return (*parts, *_housings(robot), *_counterbalance(robot))
 
 
-def _of_capsule(robot: RobotModel, capsule: Capsule) -> Part:
+def _of_capsule(robot: RobotModel, capsule: Capsule) -> SurfacePart:
     span = capsule.p1 - capsule.p0
     length = float(np.linalg.norm(span))
     kind = "base" if capsule.link == 0 else "link"
     if capsule.link == 0:
-        return Part(0, kind, _pedestal(capsule))
+        return SurfacePart(0, kind, _pedestal(capsule))
     axes = _axes(robot, capsule.link)
     along = span / length if length > 1e-6 else axes[0]
     turned = any(abs(float(along @ axis)) > _ALONG for axis in axes)
     if turned or length < capsule.radius:
-        return Part(capsule.link, kind, _turned(capsule, along, length))
-    return Part(capsule.link, kind, _beam(capsule, along, length, axes[-1]))
+        return SurfacePart(capsule.link, kind, _turned(capsule, along, length))
+    return SurfacePart(capsule.link, kind, _beam(capsule, along, length, axes[-1]))
 
 
 def _axes(robot: RobotModel, link: int) -> list[FloatArray]:
@@ -314,7 +314,7 @@ def lathe(profile: FloatArray) -> Mesh:
     return Mesh(np.concatenate(points), np.concatenate(normals), np.concatenate(triangles))
 
 
-def _housings(robot: RobotModel) -> Iterator[Part]:
+def _housings(robot: RobotModel) -> Iterator[SurfacePart]:
     """A cylinder about each joint that swings, on the link that it carries and nearly as thick as
     it.
     """
@@ -336,10 +336,12 @@ def _housings(robot: RobotModel) -> Iterator[Part]:
             (0.8 * r, half),
             (0.0, half),
         ]
-        yield Part(link, "joint", _moved(lathe(np.array(profile)), to_axis(axis), np.zeros(3)))
+        yield SurfacePart(
+            link, "joint", _moved(lathe(np.array(profile)), to_axis(axis), np.zeros(3))
+        )
 
 
-def _counterbalance(robot: RobotModel) -> Iterator[Part]:
+def _counterbalance(robot: RobotModel) -> Iterator[SurfacePart]:
     """The cylinder of the spring, from its pivot towards the rod's eye as it points with the arm
     upright.
     """
@@ -362,7 +364,7 @@ def _counterbalance(robot: RobotModel) -> Iterator[Part]:
             (0.0, reach),
         ]
     )
-    yield Part(spring.joint, "joint", _moved(lathe(profile), to_axis(along / reach), pivot))
+    yield SurfacePart(spring.joint, "joint", _moved(lathe(profile), to_axis(along / reach), pivot))
 
 
 def _distance(capsule: Capsule) -> float:

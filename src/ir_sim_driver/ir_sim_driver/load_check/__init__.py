@@ -3,7 +3,13 @@ squares.
 """
 
 from ir_sim_driver.load_check.checks import LoadChecks, LoadCheckSettings, LoadWatch
-from ir_sim_driver.load_check.estimate import Declared, LoadFinding, Motion, Uncertainty, weighed
+from ir_sim_driver.load_check.estimate import (
+    Declared,
+    LoadFinding,
+    NotedMotion,
+    Uncertainty,
+    weighed,
+)
 
 __all__ = [
     "Declared",
@@ -11,7 +17,7 @@ __all__ = [
     "LoadChecks",
     "LoadFinding",
     "LoadWatch",
-    "Motion",
+    "NotedMotion",
     "Uncertainty",
     "weighed",
 ]

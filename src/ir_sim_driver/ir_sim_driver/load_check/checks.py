@@ -8,7 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_description import DATA_SHEET, Cell, Load, data_sheet_of, load_power_parameters
-from ir_sim_driver.load_check.estimate import Declared, LoadFinding, Motion, Uncertainty, weighed
+from ir_sim_driver.load_check.estimate import (
+    Declared,
+    LoadFinding,
+    NotedMotion,
+    Uncertainty,
+    weighed,
+)
 from ir_sim_driver.notices import Level, Notices
 from ir_sim_driver.plant import Backend, Carried
 from ir_values.arrays import FloatArray
@@ -88,7 +94,7 @@ class LoadWatch:
                 self._every *= 2
         self._looks += 1
 
-    def motion(self) -> Motion | None:
+    def motion(self) -> NotedMotion | None:
         """The instants so far; None while they are too few, or not finite, as where the physics
         failed.
         """
@@ -98,7 +104,7 @@ class LoadWatch:
         reach = _REACH * self._period
         qd = (last - first) / (2.0 * reach)
         qdd = (last - 2.0 * middle + first) / reach**2
-        motion = Motion(middle, qd, qdd, torque)
+        motion = NotedMotion(middle, qd, qdd, torque)
         return motion if all(np.isfinite(values).all() for values in motion) else None
 
 

@@ -177,7 +177,7 @@ _STARTS = 2.0
 _KG = 1.0
 
 
-class Motion(NamedTuple):
+class NotedMotion(NamedTuple):
     """What was found at N instants of a movement, each (N, n): q, qd, qdd [rad, s] and torque
     [Nm].
     """
@@ -235,7 +235,7 @@ class Declared:
             robot.carrying(loads) for loads in (_heavier(load.loads), *_shifted(load.loads))
         ]
 
-    def torques(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def torques(self, motion: NotedMotion) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Expected (N, n) [Nm], more for one kg (N, n), and more for a shift of the centre (N, n,
         3).
         """
@@ -247,7 +247,7 @@ class Declared:
         return expected - np.sign(speed) * either_way, more / _KG, np.stack(shifted, axis=2)
 
 
-def weighed(motion: Motion, declared: Declared, threshold: float) -> LoadFinding | None:
+def weighed(motion: NotedMotion, declared: Declared, threshold: float) -> LoadFinding | None:
     """Weigh what was carried along a movement; None where no torque depends on the load."""
     q, qd, qdd, torque = motion
     load = declared.load

@@ -2,7 +2,6 @@
 by.
 """
 
-from ir_sim_driver.plc.emergency_stop import StopMachine, StopState
 from ir_sim_driver.plc.inputs import (
     BITS,
     LINKS,
@@ -38,8 +37,6 @@ __all__ = [
     "Plc",
     "PlcSettings",
     "Readout",
-    "StopMachine",
-    "StopState",
     "WakeOnLan",
     "Watchdog",
     "Written",

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple, cast
 from ir_msgs_py.modes import REST_OF_BIT, ROW, Mode
 from ir_msgs_py.plc import PLC_INPUT_NAMES, OperatingMode, PlcInputs
 from ir_msgs_py.status import StatusCode
+from ir_sim_driver.emergency_stop import StopMachine
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.notices import Level, Notices
-from ir_sim_driver.plc.emergency_stop import StopMachine
 from ir_sim_driver.plc.modbus import ModbusTcp
 from ir_sim_driver.plc.port import STOP_BIT, Link
 from ir_sim_driver.plc.wake_listener import WakeOnLan
