@@ -23,6 +23,7 @@ from ir_msgs.msg import PlcInputs, PowerMode, PowerState
 from ir_msgs.srv import QueryModes, Recover, SetPlcInput
 from ir_msgs_py import names
 from ir_msgs_py.ros.spinning import BackgroundExecutor
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.ros.topics import ACTION_SERVICES, REQUESTS_WAITING, SERVICE
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.node import SimDriver
@@ -147,7 +148,7 @@ def test_what_waits_for_a_busy_node_while_a_stop_is_latched_moves_nothing_after_
 
         def hold() -> None:
             busy.set()
-            done.wait(60.0)
+            done.wait(PATIENCE)
 
         start = list(positions[-1])
         path = JointTrajectory(joint_names=list(names.JOINT_NAMES))
@@ -156,7 +157,7 @@ def test_what_waits_for_a_busy_node_while_a_stop_is_latched_moves_nothing_after_
         path.points = [point]
         holding = threading.Thread(target=lambda: server.run(hold))
         holding.start()
-        busy.wait(60.0)
+        busy.wait(PATIENCE)
         for level in (True, False):
             call(press, SetPlcInput.Request(name="emergency_stop", value=level))
         sent = ros_executor.run(

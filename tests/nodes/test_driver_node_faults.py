@@ -212,7 +212,7 @@ def test_a_trajectory_on_the_topic_runs_and_overrides_the_action(client, ros_nod
 
     with pytest.raises(RequestRefusedError, match="preempted"):
         client.execute(movement(0.2, 60.0), feedback=send_once, timeout=PATIENCE)
-    wait_for(lambda: np.allclose(states[-1].position, target, atol=1e-6))
+    wait_for(lambda: states and np.allclose(states[-1].position, target, atol=1e-6))
 
 
 def test_a_cancelled_goal_comes_back_canceled(client, ros_node, wait_for):

@@ -14,6 +14,7 @@ from ir_msgs.msg import PlcInputs
 from ir_msgs.srv import SetPlcInput
 from ir_msgs_py import names
 from ir_msgs_py.ros.spinning import BackgroundExecutor
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.ros.topics import LATCHED
 from ir_sim_driver.node import SimDriver
 
@@ -54,7 +55,7 @@ def test_presses_count_beside_a_busy_executor_and_each_has_one_number(
         heard_by = 2 if durability == DurabilityPolicy.VOLATILE else 4  # all levels, and presses
         wait_for(lambda: publisher.get_subscription_count() == heard_by, what="it listens twice")
         wait_for(client.service_is_ready, what="the service is there")
-        holding = threading.Thread(target=lambda: server.run(lambda: held.wait(60.0)))
+        holding = threading.Thread(target=lambda: server.run(lambda: held.wait(PATIENCE)))
         holding.start()
         ros_executor.run(lambda: publisher.publish(PRESSED))
         wait_for(lambda: numbers[-1:] == [1], what="the press counts")

@@ -174,7 +174,7 @@ def test_a_client_of_moveit_plans_and_hears_joules(ask: Any, latched: Any, wait_
     ).motion_plan_response
     assert refused.error_code.val == Codes.INVALID_GROUP_NAME
     assert "the robot is the group manipulator" in refused.error_code.message
-    wait_for(lambda: latched["status"][-1].code == Codes.INVALID_GROUP_NAME)
+    wait_for(lambda: [s.code for s in latched["status"][-1:]] == [Codes.INVALID_GROUP_NAME])
 
 
 def test_inverse_kinematics_and_a_path_begin_where_the_client_says(ask: Any) -> None:

@@ -44,7 +44,7 @@ def send(
     wait_for(client.server_is_ready, what="plan is offered")
 
     def goals(count: int) -> list[Any]:
-        goal = Plan.Goal(stations=["park"], options=PlanOptions(planning_time=60.0))
+        goal = Plan.Goal(stations=["park"], options=PlanOptions(planning_time=PATIENCE))
         futures = [ros_executor.run(lambda: client.send_goal_async(goal)) for _ in range(count)]
         wait_for(lambda: all(future.done() for future in futures), what="goals are accepted")
         return [future.result() for future in futures]
