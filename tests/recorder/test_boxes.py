@@ -42,10 +42,14 @@ ROOT = Path(__file__).resolve().parents[2]
 PICTURES = ROOT / "out" / "pages"
 BOXES = Path(__file__).with_name("page_boxes.js").read_text()
 AXE = (Path(axe_core_python.__file__).parent / "axe.min.js").read_text(encoding="utf-8")
-FOUND = """axe.run(document, {resultTypes: ['violations']}).then(
+FOUND = """((more) => axe.run(document, {resultTypes: ['violations'], ...more}).then(
     (found) => found.violations.map((one) =>
         `${one.id}: ${one.nodes.slice(0, 3).map((node) => node.html.slice(0, 120)).join(' | ')}`))
-"""
+)"""
+DARK = "{runOnly: ['color-contrast', 'scrollable-region-focusable']}"
+"""What a page in other colours and of another width may break."""
+SAME = ("empty report", "long names")
+"""Pages of the elements of another one, which axe judges."""
 SIZES = {"desk": (1400, 900), "phone": (390, 844), "paper": (703, 1047)}
 ENDINGS = ("_desk.png", "_phone.png", ".pdf")
 OPEN = "document.querySelectorAll('details').forEach((each) => { each.open = true; })"
@@ -196,8 +200,9 @@ def test_nothing_is_cut_overlaps_or_scrolls_and_axe_finds_nothing(
             page.run(OPEN)
             page.frame()
             faults[f"{size}, all unfolded"] = page.run(BOXES)
+        if size != "paper" and name not in SAME:
             page.run(f"{AXE}; 0")
-            faults[f"{size}, axe"] = page.run(FOUND)
+            faults[f"{size}, axe"] = page.run(f"{FOUND}({DARK if size == 'phone' else '{}'})")
         page.close()
     assert {size: found for size, found in faults.items() if found} == {}
 
