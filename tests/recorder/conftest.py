@@ -385,6 +385,12 @@ def demo_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
 
 
+@pytest.fixture(scope="session")
+def short_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same run in two seconds: for tests that write and read it dozens of times."""
+    return demo_run(rest=0.1, move=0.3).record(tmp_path_factory.mktemp("recording") / "short.mcap")
+
+
 @pytest.fixture
 def new_run() -> Callable[[], Run]:
     """A run without phases."""

@@ -213,7 +213,10 @@ def test_too_little_data_are_refused() -> None:
         fit(samples, MODEL, PRIOR)
 
 
-@pytest.mark.parametrize("factor", [0.0, 1.0 / 3600.0, -1.0, 1000.0])
+@pytest.mark.parametrize(
+    "factor",
+    [0.0, 1.0 / 3600.0, *(pytest.param(f, marks=pytest.mark.long) for f in (-1.0, 1000.0))],
+)
 def test_a_meter_that_no_parameters_explain_is_refused(factor: float) -> None:
     """A meter that stands, Wh or kW for J and W, a current transformer that is turned round."""
     samples = metered(programme(4, 4, 0), PRIOR.drawn(4), 4)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from functools import cache
 from math import comb
 
 import numpy as np
@@ -46,6 +47,7 @@ def sample(kind: str, count: int) -> np.ndarray:
     return drawn(size=size) * kept - TRUTHS[kind]
 
 
+@cache
 def held(kind: str, count: int) -> float:
     """The share of samples in whose interval their mean lies; where all values are alike there is
     none.
@@ -75,7 +77,7 @@ def test_where_few_pairs_carry_the_mean_it_holds_oftener_than_students(
     kind: str, count: int
 ) -> None:
     drawn = [values for values in sample(kind, count) if not alike(values)]
-    student = np.mean([ttest_1samp(values, 0.0).pvalue > 0.10 for values in drawn])
+    student = np.mean(ttest_1samp(np.array(drawn), 0.0, axis=1).pvalue > 0.10)
     assert held(kind, count) > student + 0.04
 
 

@@ -155,10 +155,10 @@ def changed(raw: RawRecording, topic: str, messages: tuple[bytes, ...]) -> RawRe
 @pytest.mark.parametrize("topic", ["joint_states", "power_state", "controller_state"])
 @pytest.mark.parametrize("content", [b"", b"\0", b"\0\1\0\0", b"\0\1\0\0" + 40 * b"\xff"])
 def test_empty_and_foreign_messages_on_a_known_topic_are_one_sentence(
-    demo_file: Path, tmp_path: Path, topic: str, content: bytes
+    short_file: Path, tmp_path: Path, topic: str, content: bytes
 ) -> None:
-    """One among thousands, and all of them."""
-    raw = read_raw(demo_file)
+    """One among hundreds, and all of them."""
+    raw = read_raw(short_file)
     messages = next(each for each in raw.channels if each.topic.endswith(topic)).messages
     one = (*messages[:20], content, *messages[21:])
     for number, several in enumerate((one, (content,) * 20)):

@@ -76,10 +76,10 @@ def test_a_message_from_the_far_future_costs_only_itself(tmp_path: Path) -> None
     assert "2 messages have a time after the year 2260" in raw.problems
 
 
-def test_mutilated_recordings_are_read_or_refused(demo_file: Path, tmp_path: Path) -> None:
+def test_mutilated_recordings_are_read_or_refused(short_file: Path, tmp_path: Path) -> None:
     """Bytes changed, dropped and put in at random: a page, or a sentence."""
     generator = np.random.default_rng(0)
-    whole = demo_file.read_bytes()
+    whole = short_file.read_bytes()
     path = tmp_path / "m.mcap"
     for _ in range(40):
         data = bytearray(whole)

@@ -196,44 +196,53 @@ def test_a_full_disk_leaves_the_recording_that_was_to_be_replaced(
     RecordingWriter(path, overwrite=True).finish()  # and nothing is locked
 
 
-@pytest.mark.parametrize("name", ["same", "relative", "symlink", "hard link", "folder link"])
-@pytest.mark.parametrize("first", ["new", "overwrite"])
-def test_a_second_writer_of_a_file_is_refused_by_whatever_name(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, first: str
-) -> None:
-    folder = tmp_path / "shift"
-    folder.mkdir()
-    path = folder / "a.mcap"
-    if first == "overwrite":
-        RecordingWriter(path).finish()
-    writer = RecordingWriter(path, overwrite=first == "overwrite")
-    other = tmp_path / "b.mcap"
-    if name == "relative":
-        monkeypatch.chdir(folder)
-        other = Path("..") / "shift" / "a.mcap"
-    elif name == "symlink":
-        other.symlink_to(path)
-    elif name == "hard link":
-        os.link(path, other)
-    elif name == "folder link":
-        (tmp_path / "link").symlink_to(folder)
-        other = tmp_path / "link" / "a.mcap"
-    else:
-        other = path
-    with pytest.raises(PathError, match="is being written by another recorder"):
-        RecordingWriter(other, overwrite=True)
-    code = (
-        "import sys; from ir_recorder.recording import RecordingWriter\n"
-        "RecordingWriter(sys.argv[1], overwrite=True)"
-    )
-    process = subprocess.run(
-        [sys.executable, "-c", code, str(other)], capture_output=True, text=True, check=False
-    )
-    assert "is being written by another recorder" in process.stderr
-    channel = writer.register("/joint_states", JOINT_STATE)
-    writer.write(channel, 0, b"\0\1\0\0")
-    assert writer.finish().messages == 1
-    RecordingWriter(other, overwrite=True).finish()
+SECOND = """
+import sys
+from ir_recorder.errors import PathError
+from ir_recorder.recording import RecordingWriter
+for path in sys.argv[1:]:
+    try:
+        RecordingWriter(path, overwrite=True)
+    except PathError as error:
+        print(error)
+"""
+
+
+def names_of(path: Path) -> list[Path]:
+    """The file by its name, relative to here, by links to it and by one to its folder."""
+    symlink = path.with_name("symlink.mcap")
+    symlink.symlink_to(path)
+    hard_link = path.with_name("hard_link.mcap")
+    os.link(path, hard_link)
+    folder_link = path.parent.with_name(f"{path.parent.name}_link")
+    folder_link.symlink_to(path.parent)
+    return [path, Path(os.path.relpath(path)), symlink, hard_link, folder_link / path.name]
+
+
+def test_a_second_writer_of_a_file_is_refused_by_whatever_name(tmp_path: Path) -> None:
+    """In this process and in another one; a file that is new, and one that is replaced."""
+    writers = []
+    others = []
+    for kind in ("new", "replaced"):
+        path = tmp_path / kind / "a.mcap"
+        path.parent.mkdir()
+        if kind == "replaced":
+            RecordingWriter(path).finish()
+        writers.append(RecordingWriter(path, overwrite=kind == "replaced"))
+        others += names_of(path)
+    for other in others:
+        with pytest.raises(PathError, match="is being written by another recorder"):
+            RecordingWriter(other, overwrite=True)
+    words = [sys.executable, "-c", SECOND, *map(str, others)]
+    refused = subprocess.run(words, capture_output=True, text=True, check=True).stdout.splitlines()
+    assert len(refused) == len(others)
+    assert all("is being written by another recorder" in sentence for sentence in refused)
+    for writer in writers:
+        channel = writer.register("/joint_states", JOINT_STATE)
+        writer.write(channel, 0, b"\0\1\0\0")
+        assert writer.finish().messages == 1
+    for other in others:
+        RecordingWriter(other, overwrite=True).finish()
 
 
 @pytest.mark.parametrize("pairs", [20, pytest.param(200, marks=pytest.mark.long)])
