@@ -31,7 +31,9 @@ ROUNDING = 1e-3  # of J: slower movements are compared at some durations
 RISE = 5e-3  # of the drives' energy: parts are exchanged for others, whose paths differ
 
 
-@pytest.mark.parametrize("cell", ["demo", "open", "table_columns"])
+@pytest.mark.parametrize(
+    "cell", ["demo", *(pytest.param(c, marks=pytest.mark.long) for c in ("open", "table_columns"))]
+)
 def test_energy_over_cycle_time_keeps_its_laws(cell: str) -> None:
     planner = Planner(cell, clock=lambda: 0.0)
     park = np.array(planner.cell.park)

@@ -1,7 +1,7 @@
 """The law of numbers across processors: the same request gives the same bytes, whichever kernels of
 OpenBLAS, loops of NumPy and of the C library, and build of the core this processor would choose.
 
-A dozen requests in two rows of tools/processors.py; `make processors` asks them all in every row.
+A dozen requests as an old processor would answer them; `make processors` asks all in every row.
 """
 
 from __future__ import annotations
@@ -51,7 +51,9 @@ def own(numbers: list[int]) -> list[dict[str, object]]:
     return processors.asked(numbers, {})
 
 
-@pytest.mark.parametrize("name", ["an old processor", "OpenBLAS Haswell"])
+@pytest.mark.parametrize(
+    "name", ["an old processor", pytest.param("OpenBLAS Haswell", marks=pytest.mark.long)]
+)
 def test_the_same_request_gives_the_same_bytes(
     name: str, numbers: list[int], own: list[dict[str, object]]
 ) -> None:

@@ -43,7 +43,7 @@ PICK = "abc_deg: [0, 90, 0]}, approach_distance: 0.1}"
 PLACE = "{station: place, dwell: 0.5}"
 ROUNDED = 2e-3  # m: positions in a log are whole millimetres, in three axes
 S_M = PlanOptions().safety_distance
-FINE = 0.002  # rad between configurations that Coal is asked about
+FINE = 0.005  # rad between configurations that Coal is asked about
 A_STEP = (
     0.02  # m: the tool in a hundredth of a radian of each joint, at its reach, and the rounding
 )
@@ -147,7 +147,7 @@ def test_what_collides_of_the_straight_movement_is_what_coal_finds_there(
     first, last = across.trajectory.positions[[0, -1]]
     share = np.linspace(0.0, 1.0, 1 + int(np.ceil(np.abs(last - first).max() / FINE)))
     q = first + share[:, None] * (last - first)
-    near = np.array([_least_distance(asked, one) for one in q]) <= PlanOptions().safety_distance
+    near = _least_distances(asked, q) <= PlanOptions().safety_distance
     tool = Chain(asked.robot, asked.base_pose, asked.tcp).tcp_poses(q)[:, :3, 3]
     edges = np.flatnonzero(np.diff(np.concatenate([[0], near.astype(int), [0]])))
     assert len(log.stretches) == len(edges) // 2 > 0
@@ -160,22 +160,26 @@ def test_what_collides_of_the_straight_movement_is_what_coal_finds_there(
     assert re.fullmatch(r"\w+ too near \w+", log.met)
 
 
-def _least_distance(cell: Cell, q: FloatArray) -> float:
-    """The least distance [m] of what moves beyond link 2 to the machines' bodies, by Coal."""
-    links = Chain(cell.robot, cell.base_pose, cell.tcp).link_poses(q[None])[0]
+def _least_distances(cell: Cell, q: FloatArray) -> FloatArray:
+    """The least distance [m] of what moves beyond link 2 to the machines' bodies, by Coal, (N,)."""
     capsules = [*cell.robot.capsules, *(c for load in cell.loads("") for c in load.capsules)]
-    found = [np.inf]
-    for capsule, body in product((c for c in capsules if c.link > 2), cell.bodies()):
-        if np.linalg.norm(capsule.p1 - capsule.p0) > 0.0 and body.kind != "plane":
-            here = links[capsule.link] @ along_z(capsule.p0, capsule.p1)
-            shape = coal.Capsule(capsule.radius, float(np.linalg.norm(capsule.p1 - capsule.p0)))
+    moving = [
+        (c.link, along_z(c.p0, c.p1), coal.Capsule(c.radius, float(np.linalg.norm(c.p1 - c.p0))))
+        for c in capsules
+        if c.link > 2 and np.linalg.norm(c.p1 - c.p0) > 0.0
+    ]
+    standing = [
+        (_placed(np.asarray(body.pose)), solid(body))
+        for body in cell.bodies()
+        if body.kind != "plane"
+    ]
+    least = np.full(len(q), np.inf)
+    for k, links in enumerate(Chain(cell.robot, cell.base_pose, cell.tcp).link_poses(q)):
+        for (link, along, capsule), (there, body) in product(moving, standing):
             asked = coal.DistanceRequest(), coal.DistanceResult()
-            found.append(
-                coal.distance(
-                    shape, _placed(here), solid(body), _placed(np.asarray(body.pose)), *asked
-                )
-            )
-    return float(min(found))
+            here = _placed(links[link] @ along)
+            least[k] = min(least[k], coal.distance(capsule, here, body, there, *asked))
+    return least
 
 
 def _placed(pose: FloatArray) -> coal.Transform3s:

@@ -81,7 +81,7 @@ def test_without_the_signals_they_meet(plan: RobotsPlan, two: RobotCells) -> Non
         for program in plan.programs
     ]
     planted = replace(plan, programs=tuple(free))
-    assert any(nearest(planted, two, seed, 4.0) < MARGIN for seed in range(12))
+    assert any(nearest(planted, two, seed, 4.0) < MARGIN for seed in (2, 3, 5))
 
 
 def test_a_part_is_put_down_where_none_lies_and_taken_where_one_does(plan: RobotsPlan) -> None:

