@@ -23,7 +23,7 @@ OWN = {"ur10e": "first", "kr6_r900_2": "second"}  # whose URDF makes an own robo
         pytest.param("ur10e_bench", marks=pytest.mark.long),
         pytest.param("kr300_pallets", marks=pytest.mark.long),
         pytest.param("ur10e", marks=pytest.mark.long),
-        "kr6_r900_2",
+        pytest.param("kr6_r900_2", marks=pytest.mark.long),
     ],
 )
 def cell(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> str:
