@@ -84,7 +84,7 @@ def test_every_control_of_the_page_works(browser: Any, file: Path, tmp_path: Pat
     assert "full" in saved[0].read_text() or "this run" in saved[0].read_text()
     assert saved[0].read_text().count("\n") == 5
     charts = page.run(
-        "document.querySelectorAll('main canvas, main .figure svg, main .joules').length"
+        "document.querySelectorAll('main canvas, main .figure svg, main .bars').length"
     )
     assert page.run("document.querySelectorAll('button.export').length") == tables + charts
     assert tables >= 10

@@ -29,9 +29,16 @@ def page(kind: str, parts: Mapping[str, str], button: str = "") -> str:
     inner = {
         "style": asset("page.css"),
         "own_style": (own / "page.css").read_text("utf-8"),
+        "badge": "",
         "main": _filled((own / "page.html").read_text("utf-8"), parts),
     }
-    return _filled(shell, {"button": button, **parts, **inner})
+    return _filled(shell, {"button": button, **inner, **parts})
+
+
+def badge(words: str, *, good: bool) -> str:
+    """The verdict of a study beside its title: green, or open."""
+    style = "good" if good else "open"
+    return f'<div class="badges"><p class="verdict {style}">{text(words)}</p></div>'
 
 
 def settings_table(settings: Mapping[str, Any]) -> str:

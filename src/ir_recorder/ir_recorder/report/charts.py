@@ -1,137 +1,17 @@
-"""Charts as SVG: bars of joules, and energy over cycle time with its Pareto front."""
+"""Energy over cycle time with its Pareto front, as SVG; and marks by which series differ."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import dataclass
 
 from ir_msgs_py.savings import ProgramPoint
-from ir_recorder.analysis import Analysis, StepResult
-from ir_recorder.report.number_text import joules, kilowatt_hours, seconds, text
-
-# Bars of joules per movement: what consumers took right of zero, what braking axes gave left of
-# it.
-#
-# Every piece is the net energy of one consumer over the movement. The sum of both sides is what the
-# mains gave, but for what stays in the capacitors; it stands beside the bar.
+from ir_recorder.analysis import Analysis
+from ir_recorder.report.bars import TICKS, Piece, Row, bars, tick_step
+from ir_recorder.report.number_text import joules, kilowatt_hours, seconds, span_of, text
 
 _ALONG = 2.5  # labels of cycle times, about: they are wide
-TICKS = 5  # of the axis, about: labels of "12.3 kJ" stay apart on a telephone
-
-
-@dataclass(frozen=True)
-class _Piece:
-    style: str
-    name: str
-    joules: float
-
-
-@dataclass(frozen=True)
-class _Scale:
-    """From joules to percent of the track's width."""
-
-    low: float
-    high: float
-
-    def at(self, value: float) -> float:
-        return 100.0 * (value - self.low) / (self.high - self.low)
-
-
-def joule_bars(results: Sequence[StepResult]) -> str:
-    """One bar per movement; a line marks the plan, a diamond what the mains gave."""
-    if not results:
-        return '<p class="empty">No movements were recorded.</p>'
-    pieces = [_pieces(result) for result in results]
-    ends = [_taken(own) for own in pieces] + [r.step.movement.report.energy for r in results]
-    scale = _Scale(min(_given(own) for own in pieces), max(*ends, 1.0))
-    rows = [_row(result, own, scale) for result, own in zip(results, pieces, strict=True)]
-    return f'<div class="joules">{_axis(scale)}{"".join(rows)}</div>'
-
-
-def _pieces(result: StepResult) -> list[_Piece]:
-    own = [_Piece("base", "controller, drives and tool", result.base_energy)]
-    own += [
-        _Piece(f"a{j + 1}", f"axis A{j + 1}", float(v)) for j, v in enumerate(result.joint_energy)
-    ]
-    own.append(_Piece("dissipated", "brake resistor", result.dissipated_energy))
-    return [piece for piece in own if np.isfinite(piece.joules)]
-
-
-def _taken(pieces: Sequence[_Piece]) -> float:
-    return sum(piece.joules for piece in pieces if piece.joules > 0.0)
-
-
-def _given(pieces: Sequence[_Piece]) -> float:
-    return sum(piece.joules for piece in pieces if piece.joules < 0.0)
-
-
-def _row(result: StepResult, own: Sequence[_Piece], scale: _Scale) -> str:
-    label = f"{result.step.index + 1} {result.step.label}"
-    plan = result.step.movement.report.energy
-    track = [_drawn(piece, start, scale) for piece, start in _stacked(own)]
-    track.append(_mark("zero", 0.0, "zero", scale))
-    track.append(_mark("plan", plan, f"predicted {joules(plan)}", scale))
-    if np.isfinite(result.energy):
-        track.append(_mark("net", result.energy, f"at the mains {joules(result.energy)}", scale))
-    sides = f"{joules(_taken(own))} taken, {joules(-_given(own))} returned" if own else ""
-    return (
-        f'<div class="row"><span class="label">{text(label)}</span>'
-        f'<div class="track">{"".join(track)}</div>'
-        f'<span class="value"><b>{text(joules(result.energy))}</b><small>{text(sides)}</small></span></div>'  # noqa: E501
-    )
-
-
-def _stacked(own: Sequence[_Piece]) -> list[tuple[_Piece, float]]:
-    """Each piece with the joules at its left end."""
-    placed = []
-    right = 0.0
-    left = 0.0
-    for piece in own:
-        if piece.joules >= 0.0:
-            placed.append((piece, right))
-            right += piece.joules
-        else:
-            left += piece.joules
-            placed.append((piece, left))
-    return placed
-
-
-def _drawn(piece: _Piece, start: float, scale: _Scale) -> str:
-    width = scale.at(start + abs(piece.joules)) - scale.at(start)
-    verb = "takes" if piece.joules >= 0.0 else "returns"
-    words = f"{piece.name} {verb} {joules(abs(piece.joules))}"
-    place = f"left:{scale.at(start):.2f}%;width:{width:.2f}%"
-    return f'<i class="piece {piece.style}" style="{place}" title="{text(words)}"></i>'
-
-
-def _mark(style: str, value: float, words: str, scale: _Scale) -> str:
-    return f'<i class="{style}" style="left:{scale.at(value):.2f}%" title="{text(words)}"></i>'
-
-
-def _axis(scale: _Scale) -> str:
-    step = tick_step(scale.high - scale.low)
-    first = int(np.ceil(scale.low / step))
-    last = int(scale.high / step)
-    ticks = [
-        f'<span style="left:{scale.at(k * step):.2f}%">{text(joules(k * step))}</span>'
-        for k in range(first, last + 1)
-    ]
-    track = f'<div class="track">{"".join(ticks)}</div>'
-    return (
-        f'<div class="row axis"><span class="label"></span>{track}<span class="value"></span></div>'
-    )
-
-
-def tick_step(span: float) -> float:
-    """A round step (1, 2 or 5 times a power of ten) that divides a span into about TICKS."""
-    raw = span / TICKS
-    power = 10.0 ** np.floor(np.log10(raw))
-    return float(next(power * m for m in (1, 2, 5, 10) if power * m >= raw))
-
-
 # How named curves and points of one drawing differ: by a colour, a mark, and beyond seven by a
 # dash too.
 #
@@ -176,7 +56,6 @@ _NAME = 130.0
 _LINE = 18.0
 _HALF = 4.0
 _SAME_TIME = 0.01  # of the longest cycle: times that differ by less are one
-_BAR_ROW = 44.0  # of a bar with the words above it
 # span of an axis: what differs by less reads alike
 _LEAST_S = 0.05
 _LEAST_J = 5.0
@@ -193,13 +72,16 @@ _ENERGIES: dict[Callable[[float], str], _Units] = {
 @dataclass(frozen=True)
 class Point:
     """A program: cycle time [s], energy [J] at the mains, and whether that is simulated or
-    predicted.
+    predicted; the ends of its 90 % interval [J], nan where it has none. style: of its bar.
     """
 
     name: str
     seconds: float
     energy: float
     source: str
+    low: float = math.nan
+    high: float = math.nan
+    style: str = "planned"
 
 
 def front_section(analysis: Analysis, planned: Sequence[ProgramPoint] = ()) -> str:
@@ -250,25 +132,19 @@ def _one_time(points: Sequence[Point]) -> bool:
 
 
 def _energy_bars(points: Sequence[Point], show: Callable[[float], str]) -> str:
-    """A bar for each program, from zero on, with its energy and its time."""
-    most = max(max(point.energy for point in points), 1e-9)
-    named = [replace(point, name=point.name or "program of the front") for point in points]
-    high = _BAR_ROW * len(named)
+    """A bar for each program, with the whisker of its interval."""
     rows = []
-    for k, point in enumerate(named):
-        top = _BAR_ROW * k
-        wide = max(point.energy, 0.0) / most * (WIDTH - 2.0)
-        words = f"{show(point.energy)} in {seconds(point.seconds)}, {point.source}"
-        rows.append(
-            f'<text class="name" x="0" y="{top + 14:g}">{text(point.name)}: {text(words)}</text>'
-            f'<rect class="s1" x="0" y="{top + 20:g}" width="{wide:.1f}" height="12"/>'
-        )
-    said = "; ".join(f"{p.name} {seconds(p.seconds)}, {show(p.energy)}, {p.source}" for p in named)
-    return (
-        '<div class="figure"><svg class="front" id="energy_over_cycle_time" '
-        f'viewBox="0 0 {WIDTH:g} {high:g}" role="img" aria-label="{text(said)}">'
-        f"{''.join(rows)}</svg></div>"
-    )
+    for point in points:
+        name = point.name or "program of the front"
+        words = show(point.energy)
+        notes = (f"{point.source}, in {seconds(point.seconds)}", _between(point, show))
+        piece = Piece(point.style, f"{name} {words}", point.energy)
+        rows.append(Row(name, (piece,), words, notes, whisker=(point.low, point.high)))
+    return bars(rows, "energy of a cycle")
+
+
+def _between(point: Point, show: Callable[[float], str]) -> str:
+    return span_of(point.low, point.high, show) if point.low < point.high else ""
 
 
 def pareto(points: Sequence[Point]) -> list[Point]:
@@ -337,6 +213,8 @@ class _Axis:
         step = tick_step(1.2 * self.span / self.scale * TICKS / self.labels)
         middle = 0.5 * (self.low + self.high)
         first = math.floor((middle - 0.55 * self.span) / self.scale / step)
+        if self.low >= 0.0:
+            first = max(first, 0)
         last = math.ceil((middle + 0.55 * self.span) / self.scale / step)
         return step, first, last
 

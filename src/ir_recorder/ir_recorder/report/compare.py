@@ -26,6 +26,7 @@ from ir_recorder.analysis.production import (
 )
 from ir_recorder.analysis.results import ProgramTotals, Share
 from ir_recorder.analysis.steps import step_label
+from ir_recorder.report.bars import Piece, Row, bars
 from ir_recorder.report.charts import Point, front_part
 from ir_recorder.report.costs import (
     Costs,
@@ -157,7 +158,29 @@ def _paid(compared: Sequence[Compared], names: Sequence[str], costs: Costs) -> s
         "timers; intervals hold 90 %. "
     )
     shown = table(("", *(f">{name}" for name in names)), rows, "For those who pay")
-    return f'{shown}<p class="hint">{text(hint)}{counted_with(costs)}</p>'
+    drawn = "" if _apart(analyses) else _year_bars(analyses, cycles, names, costs)
+    return f'{drawn}{shown}<p class="hint">{text(hint)}{counted_with(costs)}</p>'
+
+
+def _year_bars(
+    analyses: Sequence[Analysis],
+    cycles: Sequence[Production | None],
+    names: Sequence[str],
+    costs: Costs,
+) -> str:
+    """A year of such cycles of each recording, with its interval where it is predicted."""
+    rows = []
+    for analysis, cycle, name in zip(analyses, cycles, names, strict=True):
+        if cycle is None:
+            continue
+        energy = costs.energy_of_year(cycle)
+        price = energy.of(costs.money)
+        shown = yearly_money(price.value, costs.currency)
+        style = "planned" if analysis.program is None else "driven"
+        notes = (f"a year of such cycles, {plant_of(analysis)}", kilowatt_hours(energy.value))
+        piece = Piece(style, shown, price.value)
+        rows.append(Row(name, (piece,), shown, notes, whisker=(price.low, price.high)))
+    return bars(rows, "a year of such cycles") if len(rows) > 1 else ""
 
 
 def _year(cycle: Production | None, first: Production | None, costs: Costs) -> str:

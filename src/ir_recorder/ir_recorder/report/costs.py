@@ -1,4 +1,4 @@
-"""Energy, money and CO2 of a cycle: prices, savings, and the biggest levers."""
+"""Energy, money and CO2 of a cycle: prices, savings, and what to change first."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from ir_recorder.report.number_text import (
     watt_hours,
     watts,
 )
-from ir_recorder.report.tables import table
+from ir_recorder.report.tables import bar, table
 from ir_values.errors import InvalidValueError, IrError
 from ir_values.files import ANYWHERE, FileRoots
 from ir_values.settings import Setting, check_settings, describe, setting
@@ -528,7 +528,7 @@ def _setting(costs: Costs, name: str) -> str:
     return value if isinstance(value, str) else f"{value:g} {unit}".strip()
 
 
-# The biggest levers as a table: joules, share, money a year, and what would save them.
+# What to change first: the biggest levers and rest outside of the shifts, as a table.
 
 
 def lever_section(analysis: Analysis, costs: Costs) -> str:
@@ -538,22 +538,30 @@ def lever_section(analysis: Analysis, costs: Costs) -> str:
     if not found or cycle is None:
         return ""
     yearly = costs.cycles_per_year(cycle.pace)
-    rows = (
+    rows = [
         (
-            text(lever.name),
-            f"<b>{watt_hours(lever.joules)}</b>",
-            share(lever.joules, cycle.energy),
-            text(yearly_money(costs.money(lever.joules * yearly), costs.currency)),
-            f"{text(lever.means)}<small>counted: {text(lever.basis)}</small>",
+            costs.money(lever.joules * yearly),
+            f"{text(lever.name)}<small>{text(lever.means)}; counted: {text(lever.basis)}</small>",
+            f"<b>{watt_hours(lever.joules)}</b><small>{share(lever.joules, cycle.energy)}</small>",
         )
         for lever in found
-    )
-    heads = ("lever", ">a cycle, at most", ">share", ">a year, at most", "what would save them")
+    ]
+    idle = idle_saving(idle_watts(analysis), costs)
+    if idle is not None:
+        words = f"{idle.mode} instead of brakes that are only closed"
+        name = f"at night and at weekends<small>{text(words)}</small>"
+        rows.append((idle.saved, name, DASH))
+    rows.sort(key=lambda row: -row[0])
+    most = max(rows[0][0], 1e-9)
+    cells = [
+        (name, joules, text(yearly_money(money, costs.currency)), bar(money, most, "planned"))
+        for money, name, joules in rows
+    ]
+    heads = ("what", ">a cycle, at most", ">a year, at most", "")
     return (
-        '<section id="levers"><h2>The biggest levers</h2><p class="hint">Upper bounds from '
-        "figures of this "
-        "run, each by itself: together they count some joules twice.</p>"
-        f"{table(heads, rows, 'The biggest levers')}</section>"
+        '<section id="levers"><h2>What to change first</h2><p class="hint">Upper bounds from '
+        "figures of this run, each by itself: together they count some joules twice.</p>"
+        f"{table(heads, cells, 'What to change first')}</section>"
     )
 
 

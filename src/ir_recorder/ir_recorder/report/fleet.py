@@ -390,11 +390,11 @@ def fleet_html(
         _section("Robots", _robots(robots, prices)),
         _section("Peak, and when nobody works", _around_the_clock(members, robots, prices)),
         _section("Month by month: driven and predicted", _months(members)),
+        _section("What could be saved, by measure", _potential(known, summed, prices)),
+        line_section(fleet_of_line(members, prices), prices),
         folded(
             _section("By power mode", _matrix("mode", by_mode(known, prices), summed)), paper=True
         ),
-        _section("What could be saved, by measure", _potential(known, summed, prices)),
-        line_section(fleet_of_line(members, prices), prices),
         folded(
             _section(
                 "By movement and pause", _matrix("movement", by_movement(known, prices), summed)
@@ -440,8 +440,9 @@ def _paid(members: Sequence[Member], costs: Costs) -> str:
     if saved is None:
         return Paid(None, 0.0, idle, None).html(costs)
     robots = len({member.robot for member in members if member.cycle.savings is not None})
-    notes = (f"{counted(robots, 'robot')}, predicted",)
-    return Paid(saved, common, idle, fleet_of_line(members, costs), notes, robots).html(costs)
+    of = f", {counted(robots, 'robot')}"
+    line = fleet_of_line(members, costs)
+    return Paid(saved, common, idle, line, of, "common programs", robots=robots).html(costs)
 
 
 def _robots(robots: Sequence[Robot], costs: Costs) -> str:

@@ -171,8 +171,15 @@ def paid_row(analysis: Analysis, costs: Costs) -> str:
     total = cycle.savings.total
     pace = total.seconds or cycle.seconds
     common = total.common * costs.cycles_per_year(pace)
-    notes = (f"{cycles_of_year(pace, costs)}, predicted", cycle.supply)
-    return Paid(saved, common, idle, of_recording(analysis, costs), notes).html(costs)
+    counted = f", {cycles_of_year(pace, costs)}"
+    driven = None
+    if analysis.program is not None:
+        name = f"as driven, {analysis.recording.origin}"
+        driven = (name, costs.energy_of_year(cycle).value)
+    line = of_recording(analysis, costs)
+    return Paid(saved, common, idle, line, counted, "common program", driven, cycle.supply).html(
+        costs
+    )
 
 
 def run_tiles(analysis: Analysis) -> str:

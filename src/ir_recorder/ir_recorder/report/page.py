@@ -12,7 +12,8 @@ from ir_description import load_power_data
 from ir_msgs_py.savings import ProgramPoint
 from ir_recorder.analysis import Analysis, Finding, Tolerances
 from ir_recorder.analysis.indirect import agreement
-from ir_recorder.report.charts import front_section, joule_bars
+from ir_recorder.report.bars import joule_bars
+from ir_recorder.report.charts import front_section
 from ir_recorder.report.costs import (
     Costs,
     assumed_section,

@@ -1,23 +1,25 @@
-"""The first row of every page for those who pay: what the plan saves a year, what rest outside of
-the shifts saves, both together, and what that is of the line and of the factory.
+"""The top of every page for those who pay: a year before and after as bars, what the plan saves of
+it, what rest outside of the shifts saves, both together, and what that is of the line and of the
+factory.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ir_recorder.analysis.production import Amount
+from ir_recorder.report.bars import Piece, Row, bars
 from ir_recorder.report.costs import (
     Costs,
     IdleSaving,
     payback,
-    share_between,
     yearly_money,
     yearly_span,
 )
 from ir_recorder.report.number_text import kilowatt_hours, text
-from ir_recorder.report.whole_line import WholeLine
+from ir_recorder.report.whole_line import WholeLine, with_ends
 
 
 @dataclass(frozen=True)
@@ -37,15 +39,19 @@ class Tile:
 @dataclass(frozen=True)
 class Paid:
     """What those who pay ask first. saved [J] a year by the plan, of `common` [J]; None where it is
-    not known; idle: outside of the shifts; line: of more than robots. notes: lines of the first.
-    robots: how many save it together.
+    not known; idle: outside of the shifts; line: of more than robots. counted: what the year is
+    made of, in words; before: what it is held against. driven: what else a year of it is called,
+    and what that takes [J]. supply: what limits the figures. robots: how many save it together.
     """
 
     saved: Amount | None
     common: float
     idle: IdleSaving | None
     line: WholeLine | None
-    notes: tuple[str, ...] = ()
+    counted: str = ""
+    before: str = "today"
+    driven: tuple[str, float] | None = None
+    supply: str = ""
     robots: int = 1
 
     def tiles(self, costs: Costs) -> list[Tile]:
@@ -54,21 +60,61 @@ class Paid:
         return [tile for tile in shown if tile is not None]
 
     def html(self, costs: Costs) -> str:
-        """As a row of the page; "" where nothing is known."""
+        """The picture and the row of figures; "" where nothing is known."""
         shown = self.tiles(costs)
-        return row_of(shown) if shown else ""
+        return self.picture(costs) + row_of(shown) if shown else ""
+
+    def picture(self, costs: Costs) -> str:
+        """A year before and after, with its message as the head; "" where the saving isn't
+        known.
+        """
+        if self.saved is None:
+            return ""
+        nights = (0.0, 0.0) if self.idle is None else (self.idle.left_alone, self.idle.deepest)
+        shifts = costs.money(self.common), costs.money(self.common - self.saved.value)
+        before = shifts[0] + nights[0]
+        saved = self._money(costs)
+        word, gain = saved.gain()
+        ends = (before - saved.high, before - saved.low)
+        sure = f"90 % interval {yearly_span(*ends)} {costs.currency}" if ends[0] < ends[1] else ""
+        rows = [
+            _year_row(self.before, "today", (shifts[0], nights[0]), costs),
+            _year_row("as planned", "planned", (shifts[1], nights[1]), costs, ends, sure),
+        ]
+        if self.driven is not None:
+            name, energy = self.driven
+            rows.append(_year_row(name, "driven", (costs.money(energy), nights[1]), costs))
+        less = "less" if word == "saved" else "more"
+        head = f"{yearly_money(gain.value, costs.currency)} {less} a year"
+        if saved.doubt:
+            head = f"It is open whether anything is saved: {head}"
+        pale = " Pale: at night and at weekends." if self.idle is not None else ""
+        whisker = " Whisker: 90 % interval of what is saved." if sure else ""
+        hint = f"Energy costs of a year. In full colour: in shifts{self.counted}.{pale}{whisker}"
+        return (
+            f'<section id="year"><h2>{text(head)}</h2>{bars(rows, "energy costs of a year")}'
+            f'<p class="hint">{text(hint)}</p></section>'
+        )
+
+    def _money(self, costs: Costs) -> Amount:
+        """What is saved of a year in all."""
+        assert self.saved is not None
+        money = self.saved.of(costs.money)
+        night = 0.0 if self.idle is None else self.idle.saved
+        return Amount(money.value + night, money.low + night, money.high + night)
 
     def _saved(self, costs: Costs) -> Tile | None:
         if self.saved is None:
             return None
         word, gain = self.saved.gain()
+        energy = kilowatt_hours(gain.value)
+        share = with_ends(gain.times(100.0 / self.common)) if self.common > 0.0 else ""
+        less = "less" if word == "saved" else "more"
         notes = (
             _between(gain.of(costs.money), costs),
-            f"{_percent(gain.value, self.common)} {'less' if word == 'saved' else 'more'}, "
-            f"{kilowatt_hours(gain.value)} a year",
-            share_between(gain, self.common),
+            f"{share} {less}, {energy}",
             gain.doubt,
-            *self.notes,
+            self.supply,
             self._payback(self.saved, costs),
         )
         price = yearly_money(costs.money(gain.value), costs.currency)
@@ -83,33 +129,23 @@ class Paid:
         if self.idle is None:
             return None
         found = self.idle
-        today, then = (
-            yearly_money(cost, costs.currency) for cost in (found.left_alone, found.deepest)
-        )
         return Tile(
             "saved a year at night and at weekends",
             yearly_money(found.saved, costs.currency),
             (
-                f"{today} with the brakes closed ({found.watts_left_alone:.0f} W)",
-                f"{then} in {found.mode} ({found.watts_deepest:.0f} W)",
+                f"{found.mode} ({found.watts_deepest:.0f} W) instead of closed brakes "
+                f"({found.watts_left_alone:.0f} W)",
             ),
         )
 
     def _both(self, costs: Costs) -> Tile | None:
         if self.saved is None or self.idle is None:
             return None
-        night = self.idle.saved
-        money = self.saved.of(costs.money)
-        saved = Amount(money.value + night, money.low + night, money.high + night)
-        word, gain = saved.gain()
+        word, gain = self._money(costs).gain()
         price = yearly_money(gain.value, costs.currency)
         today = costs.money(self.common) + self.idle.left_alone
-        before, after = (
-            yearly_money(cost, costs.currency) for cost in (today, today - saved.value)
-        )
         share = f"{_percent(gain.value, today)} {'less' if word == 'saved' else 'more'}"
-        notes = (_between(gain, costs), f"{after} instead of {before}: {share}")
-        return Tile(f"{word} a year, both together", price, notes)
+        return Tile(f"{word} a year, both together", price, (_between(gain, costs), share))
 
     def _line(self) -> Tile | None:
         if self.line is None:
@@ -121,11 +157,29 @@ class Paid:
             f"{line.value:.1f} %",
             (
                 _percents(line),
-                f"of the factory with its hall {factory.value:.1f} %",
-                _percents(factory),
+                f"of the factory with its hall {with_ends(factory)}",
                 "if every robot did the same, in shifts",
             ),
         )
+
+
+def _year_row(
+    name: str,
+    style: str,
+    money: tuple[float, float],
+    costs: Costs,
+    whisker: tuple[float, float] = (math.nan, math.nan),
+    between: str = "",
+) -> Row:
+    """A bar of a year: money in shifts, and outside of them."""
+    shifts, nights = (yearly_money(each, costs.currency) for each in money)
+    pieces = [Piece(style, f"in shifts {shifts}", money[0])]
+    parts = ""
+    if money[1] > 0.0:
+        pieces.append(Piece(f"{style} night", f"at night and at weekends {nights}", money[1]))
+        parts = f"{shifts} in shifts, {nights} outside"
+    price = yearly_money(sum(money), costs.currency)
+    return Row(name, tuple(pieces), price, (parts, between), whisker=whisker)
 
 
 def row_of(tiles: Sequence[Tile]) -> str:

@@ -51,7 +51,7 @@ from ir_recorder.report.page import PAGE_START, asset
 from ir_recorder.report.paid import Paid, Tile, row_of
 from ir_recorder.report.series import long_rests
 from ir_recorder.report.step_table import TableValue, write_columns
-from ir_recorder.report.tables import table
+from ir_recorder.report.tables import bar, table
 from ir_recorder.report.whole_line import line_section, of_saving
 from ir_values.files import ANYWHERE, FileRoots
 
@@ -104,13 +104,12 @@ _FIT = 0.999  # of the cycles: fewer are said
 def paid_row(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     """What those who pay ask first, of the side that the changes lead to."""
     side = found.planned
-    counted = year_of(found, side, costs)
-    today = side.saving.common * counted.cycles_a_year
+    year = year_of(found, side, costs)
+    today = side.saving.common * year.cycles_a_year
     idle = _idle(found, cell, costs)
     line = of_saving(side.saving, costs) if cell.robot.controller.counted else None
-    before = yearly_money(costs.money(today), costs.currency)
-    notes = (f"today {before} a year", f"{cycles_of_year(counted.pace, costs)}, predicted")
-    return Paid(counted.saved, today, idle, line, notes).html(costs)
+    counted = f", {cycles_of_year(year.pace, costs)}"
+    return Paid(year.saved, today, idle, line, counted).html(costs)
 
 
 def tiles(found: BeforeAfter, costs: Costs) -> str:
@@ -201,25 +200,32 @@ def _idle(found: BeforeAfter, cell: Cell, costs: Costs) -> IdleSaving | None:
 def change_table(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     """The changes that save most, the least work first, and the rest outside of the shifts."""
     cycles = year_of(found, found.planned, costs).cycles_a_year
-    rows = [_change(k, change, cycles, costs) for k, change in enumerate(found.changes, start=1)]
+    priced = [
+        (costs.money(change.saving.saved * cycles), _change(k, change))
+        for k, change in enumerate(found.changes, start=1)
+    ]
     idle = _idle(found, cell, costs)
     if idle is not None:
         words = f"{idle.mode} instead of brakes that are only closed"
-        price = yearly_money(idle.saved, costs.currency)
-        rows.append(("at night and at weekends", text(words), DASH, text(price)))
+        where = f"at night and at weekends<small>{WORK[MODE]}</small>"
+        priced.insert(0, (idle.saved, (where, text(words), DASH)))
+    most = max((price for price, _ in priced), default=0.0)
+    rows = [
+        (*cells, text(yearly_money(price, costs.currency)), bar(price, most, "planned"))
+        for price, cells in priced
+    ]
     none = "" if found.changes else '<p class="empty">No change saves as much as a joule.</p>'
-    heads = ("where", "what to do", ">saved a cycle", ">saved a year")
+    heads = ("where", "what to do", ">saved a cycle", ">saved a year", "")
     return none + (table(heads, rows, "Changes") if rows else "")
 
 
-def _change(k: int, change: Change, cycles: float, costs: Costs) -> tuple[str, ...]:
+def _change(k: int, change: Change) -> tuple[str, ...]:
     saving = change.saving
     between = span_of(saving.saved_low, saving.saved_high, watt_hours)
     return (
         f"{k}. {text(change.name)}<small>{text(WORK[change.work])}{_long(change)}</small>",
         text(change.words),
         _cell(watt_hours(saving.saved), between, "" if saving.certain else OPEN),
-        text(yearly_money(costs.money(saving.saved * cycles), costs.currency)),
     )
 
 
@@ -427,7 +433,7 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
         "assumed": assumed_section(prices),
         "changes": change_table(found, cell, prices),
         "hops": hop_table(found),
-        "front": front_part([_point(side) for side in there], kilowatt_hours),
+        "front": front_part(_points(there), kilowatt_hours),
         "choices": "".join(_choice(side, found.towards) for side in there[1:]),
         "style": asset("page.css") + asset("before_after.css"),
         "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
@@ -454,8 +460,15 @@ def _problems(found: BeforeAfter, cell: Cell) -> str:
     return f'<div class="problems calm"><b>Notes</b><ul>{listed}</ul></div>'
 
 
-def _point(side: Side) -> Point:
-    return Point(side.name, side.report.duration, side.report.energy, "predicted")
+def _points(sides: Sequence[Side]) -> list[Point]:
+    """The programs, today's first."""
+    points: list[Point] = []
+    for side in sides:
+        report = side.report
+        ends = report.energy_low, report.energy_high
+        style = "planned" if points else "today"
+        points.append(Point(side.name, report.duration, report.energy, "predicted", *ends, style))
+    return points
 
 
 def _choice(side: Side, towards: str) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from textwrap import wrap
 
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.flows import EnergyFlows, energy_flows
@@ -21,6 +22,8 @@ BAR = 14.0
 _TOP = 26.0
 _COLUMNS = (8.0, 240.0, 450.0, 690.0)
 _LEAST = 0.002  # share of the mains that is drawn; less is in the table alone
+_LINE = 16.0
+_WIDEST = 26  # letters of a line between two columns
 _SMALL = 0.01  # the same, from which on a narrow bar says its share
 
 
@@ -231,13 +234,16 @@ def _bar(node: _Node, scale: float, mains: float) -> str:
     at = x + BAR + 6.0
     if node.column < len(_COLUMNS) - 1 and high < 2.4 * GAP and node.column:
         own = words if node.joules > _SMALL * mains else energy
-        one = f"{text(node.name)} {text(own)}"
-        return f'{rect}<text x="{at:g}" y="{node.y + high / 2.0 + 4.0:.1f}">{one}</text>'
-    y = node.y + min(high / 2.0, 60.0)
-    return (
-        f'{rect}<text x="{at:g}" y="{y - 3.0:.1f}" class="name">{text(node.name)}</text>'
-        f'<text x="{at:g}" y="{y + 13.0:.1f}">{text(words)}</text>'
+        lines = [("", line) for line in wrap(f"{node.name} {own}", _WIDEST)]
+    else:
+        lines = [(' class="name"', line) for line in wrap(node.name, _WIDEST)]
+        lines.append(("", words))
+    y = node.y + min(high / 2.0, 60.0) + 5.0 - _LINE * (len(lines) - 1) / 2.0
+    said = (
+        f'<text x="{at:g}" y="{y + _LINE * k:.1f}"{kind}>{text(line)}</text>'
+        for k, (kind, line) in enumerate(lines)
     )
+    return rect + "".join(said)
 
 
 def _title(source: str, to: str, value: float) -> str:

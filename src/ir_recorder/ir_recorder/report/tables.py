@@ -163,7 +163,7 @@ def mode_table(analysis: Analysis) -> str:
             f"{share.seconds:.1f} s",
             joules(share.energy),
             watts(share.energy / share.seconds) if share.seconds else DASH,
-            _bar(share.energy, most, f"m-{share.name}"),
+            bar(share.energy, most, f"m-{share.name}"),
         )
         for share in sorted(analysis.modes, key=lambda share: -share.energy)
     ]
@@ -263,7 +263,8 @@ def _share(share: Share) -> str:
     )
 
 
-def _bar(value: float, most: float, kind: str) -> str:
+def bar(value: float, most: float, kind: str) -> str:
+    """A bar of a table's row, of the colour `kind`."""
     width = 100.0 * max(value, 0.0) / most if most > 0.0 else 0.0
     return f'<span class="bar {text(kind)}" style="width:{width:.1f}%"></span>'
 

@@ -15,10 +15,12 @@ from ir_description import Cell, is_path, load_cell
 from ir_kernels import Chain
 from ir_planner.search import SEARCHES
 from ir_planner.search.with_ompl import needs_ompl
+from ir_recorder.report.bars import Piece, Row, bars
 from ir_recorder.report.charts import Point, front_chart
 from ir_recorder.report.files import write_output
 from ir_recorder.report.number_text import DASH, joules, millimetres, percent, seconds, text
 from ir_recorder.report.page import PAGE_START, asset
+from ir_recorder.report.paid import Tile, row_of
 from ir_recorder.report.series import Curves, Json, packed
 from ir_recorder.report.shapes import body_mesh, capsule_mesh
 from ir_recorder.report.tables import table
@@ -36,7 +38,7 @@ from ir_studies.arena.figures import (
     success_over_time,
 )
 from ir_studies.arena.settings import PORTFOLIO, ArenaSettings, settings_text
-from ir_studies.page import BUTTON, page
+from ir_studies.page import BUTTON, badge, page
 from ir_values.arrays import FloatArray
 from ir_values.files import ANYWHERE
 
@@ -108,6 +110,7 @@ _HEADS = (
     "planner", ">solved", ">first answer", ">best answer", ">J above the best", ">W above the least",  # noqa: E501
     ">duration", ">energy", ">clearance", ">lost",
 )  # fmt: skip
+_NAMED = 3  # planners, of those that are alike
 _TIE = 5e-5  # of J: less is not shown
 # percent: what a curve of costs shows where nothing, or something more expensive, is known
 _ABOVE = 25.0
@@ -125,12 +128,16 @@ def write_page(runs: Sequence[Run], settings: ArenaSettings, path: Path, missing
 def page_html(runs: Sequence[Run], settings: ArenaSettings, missing: int = 0) -> str:
     """The page as text. missing: runs that were not made yet."""
     titles = _titles(settings.cells)
+    every = [figures(planner, runs) for planner in settings.planners]
     blocked, _ = blocked_and_free(runs)
     shown = blocked or runs
     end = min(longest(shown), settings.seconds)  # what comes after these doesn't count
     parts = {
         "title": "Arena",
         "subtitle": text(_subtitle(runs, settings, missing)),
+        "badge": _badge(runs, settings),
+        "tiles": _tiles(every),
+        "solved": _solved_bars(every),
         "verdict": verdict(runs, settings),
         "shown": "Questions whose straight movement is free are left out: there nothing is "
         "searched."
@@ -201,25 +208,83 @@ def _titles(cells: Sequence[str]) -> dict[str, str]:
     return {cell: name if names.count(name) == 1 else cell for cell, name in short.items()}
 
 
-def verdict(runs: Sequence[Run], settings: ArenaSettings) -> str:
-    """Whether nobody solved more and cost less than the portfolio in any cell, or where not."""
-    if PORTFOLIO not in settings.planners or len(settings.planners) == 1:
-        return ""
+def behind(runs: Sequence[Run], settings: ArenaSettings) -> list[str]:
+    """Where somebody solved more than the portfolio, or cost less, in sentences."""
     said: list[str] = []
-    titles = {cell: name for cell, name in _titles(settings.cells).items() if of_cell(runs, cell)}
-    for cell, title in titles.items():
+    for cell, title in _titles(settings.cells).items():
         blocked, free = blocked_and_free(of_cell(runs, cell))
         said += _against(blocked, title, settings)
         said += _against(free, f"{title}, straight movement free", settings)
-    place = "In no cell" if len(titles) == len(settings.cells) else "In no cell that has runs"
+    return said
+
+
+def _judged(settings: ArenaSettings) -> bool:
+    return PORTFOLIO in settings.planners and len(settings.planners) > 1
+
+
+def _badge(runs: Sequence[Run], settings: ArenaSettings) -> str:
+    if not _judged(settings):
+        return ""
+    if behind(runs, settings):
+        return badge("The portfolio is not ahead everywhere", good=False)
+    return badge("Nobody is ahead of the portfolio", good=True)
+
+
+def verdict(runs: Sequence[Run], settings: ArenaSettings) -> str:
+    """Whether nobody solved more and cost less than the portfolio in any cell, or where not."""
+    if not _judged(settings):
+        return ""
+    whole = all(of_cell(runs, cell) for cell in settings.cells)
+    place = "In no cell" if whole else "In no cell that has runs"
     held = (
         f"{place} did anybody solve more than the portfolio, or have a lower median J where both "
         "solved."
     )
-    items = "".join(f"<li>{text(words)}</li>" for words in said or [held])
+    items = "".join(f"<li>{text(words)}</li>" for words in behind(runs, settings) or [held])
     return (
         f'<section id="verdict"><h2>The portfolio against the others</h2><ul>{items}</ul></section>'
     )
+
+
+def _solved_bars(found: Sequence[Figures]) -> str:
+    """Who solved how many runs, most first, with the time and cost of its answers."""
+    rows = [
+        Row(
+            one.planner,
+            (Piece("planned" if one.planner == PORTFOLIO else "today", "solved", one.success),),
+            f"{one.solved} of {one.count}",
+            (
+                f"first answer {milliseconds(one.first)}, J {percent(one.cost_ratio - 1.0)} above "
+                "the best",
+            ),
+        )
+        for one in sorted(found, key=lambda one: (-one.solved, one.cost_ratio))
+        if one.count
+    ]
+    return bars(rows, "runs that were solved") if rows else ""
+
+
+def _tiles(found: Sequence[Figures]) -> str:
+    """The planner that solved most, the soonest and the cheapest of those that solved as many."""
+    known = [one for one in found if one.solved]
+    if not known:
+        return ""
+    most = max(one.success for one in known)
+    best = [one for one in known if one.success == most]
+    soonest = min(best, key=lambda one: one.first)
+    cheapest = min(best, key=lambda one: one.cost_ratio)
+    names = ", ".join(one.planner for one in best[:_NAMED])
+    more = f" and {len(best) - _NAMED} more" if len(best) > _NAMED else ""
+    among = "of those that solved most"
+    tiles = (
+        Tile("most runs solved", f"{best[0].solved} of {best[0].count}", (f"{names}{more}",)),
+        Tile("soonest first answer", milliseconds(soonest.first), (soonest.planner, among)),
+        Tile(
+            "least J above the best", percent(cheapest.cost_ratio - 1.0), (cheapest.planner, among)
+        ),
+        Tile("least clearance", millimetres(min(one.clearance for one in known)), ("of all runs",)),
+    )
+    return row_of(tiles)
 
 
 def _against(own: Sequence[Run], place: str, settings: ArenaSettings) -> Iterator[str]:

@@ -16,6 +16,8 @@ from scipy.spatial import ConvexHull, QhullError
 from ir_description import Cell, cell_to_yaml
 from ir_planner.checks import JouleInterval
 from ir_recorder.analysis.production import Amount
+from ir_recorder.report.bars import Piece, Row, bars
+from ir_recorder.report.costs import Costs, assumed_section, cycles_of_year, yearly_money
 from ir_recorder.report.files import write_output
 from ir_recorder.report.number_text import (
     DASH,
@@ -201,7 +203,8 @@ def write_page(
 def page_html(
     known: Sequence[Known], finals: Sequence[Sequence[Final]], settings: LayoutSettings, cell: Cell
 ) -> str:
-    """The page as text. cell: as given."""
+    """The page as text. cell: as given. Money is that of the assumed prices and shifts."""
+    costs = Costs()
     said = "".join(
         f"<li>{text(_briefly(one, finals))}</li>" for one in sentences(known, finals, settings)
     )
@@ -210,7 +213,9 @@ def page_html(
         "subtitle": text(
             f"{len(known)} placements, {len(settings.variables)} variables; energies are predicted"
         ),
-        "tiles": _tiles(known, finals),
+        "tiles": _tiles(known, finals, costs),
+        "bars": _bars(finals),
+        "assumed": assumed_section(costs),
         "verdict": f"<ul>{said}</ul>",
         "best": table(_HEADS, _rows(finals), "The best placements"),
         "map": "".join(_maps(known, finals, settings, cell)),
@@ -223,7 +228,35 @@ def page_html(
     return page("layout", parts)
 
 
-def _tiles(known: Sequence[Known], finals: Sequence[Sequence[Final]]) -> str:
+def _bars(finals: Sequence[Sequence[Final]]) -> str:
+    """Energy of a cycle as given and of the best, with their intervals; "" where nothing was
+    planned.
+    """
+    rows = []
+    rank = 0
+    for own in finals:
+        rank += not own[0].is_given
+        name = "as given" if own[0].is_given else f"best_{rank}.yaml"
+        for one in own:
+            if not one.solved:
+                continue
+            energy = kilowatt_hours(one.mean())
+            within = one.interval
+            between = span_of(within.low, within.high, kilowatt_hours)
+            style = "today" if one.is_given else "planned"
+            rows.append(
+                Row(
+                    name if len(own) == 1 else f"{name}, {one.condition.text}",
+                    (Piece(style, energy, one.mean()),),
+                    energy,
+                    (f"90 % interval {between}", f"in {seconds(one.mean('duration_s'))}"),
+                    whisker=(within.low, within.high),
+                )
+            )
+    return bars(rows, "energy of a cycle") if rows else ""
+
+
+def _tiles(known: Sequence[Known], finals: Sequence[Sequence[Final]], costs: Costs) -> str:
     """The best of the others against the given placement, under the first condition."""
     given, best = ends(finals)
     impossible = sum(one.cost == math.inf for one in known)
@@ -236,6 +269,8 @@ def _tiles(known: Sequence[Known], finals: Sequence[Sequence[Final]]) -> str:
     word, gain = Amount(less, within.low, within.high).gain()
     share = percent(gain.value / like.mean()).lstrip("+")
     between = span_of(gain.low, gain.high, kilowatt_hours)
+    pace = like.mean("duration_s")
+    cycles = costs.cycles_per_year(pace)
     moving = 1.0 - one.mean("moving_j") / like.mean("moving_j")
     moved = f"{percent(abs(moving)).lstrip('+')} {'less' if moving >= 0.0 else 'more'}"
     saved = "saved a cycle by the best" if word == "saved" else "more a cycle by the best"
@@ -248,6 +283,14 @@ def _tiles(known: Sequence[Known], finals: Sequence[Sequence[Final]]) -> str:
                 "energy of a cycle",
                 kilowatt_hours(one.mean()),
                 (f"as given {kilowatt_hours(like.mean())}", "at the mains, predicted"),
+            ),
+            Tile(
+                f"{word} a year by the best",
+                yearly_money(costs.money(gain.value * cycles), costs.currency),
+                (
+                    f"{cycles_of_year(pace, costs)}",
+                    f"{costs.price:g} {costs.currency}/kWh and shifts assumed",
+                ),
             ),
             Tile("movements alone", moved, ("than as given",)),
             Tile(
@@ -383,8 +426,9 @@ def _chart(variable: Variable, known: Sequence[Known], low: float, high: float) 
         f"{variable.unit}</text>"
         for x, anchor, value in ends_of
     ]
+    decimals = max(1, 1 - math.floor(math.log10(max(high - low, 1e-9) / 1e3)))
     numbers += [
-        f'<text x="{_LEFT - 6:g}" y="{y:g}" text-anchor="end">{value / 1e3:.1f}</text>'
+        f'<text x="{_LEFT - 6:g}" y="{y:g}" text-anchor="end">{value / 1e3:.{decimals}f}</text>'
         for y, value in ((16.0, high), (_HIGH - _BELOW, low))
     ]
     line = f'<path class="grid" d="M{_LEFT:g} 8V{_HIGH - _BELOW + 4:g}H{_CHART - 6:g}"/>'

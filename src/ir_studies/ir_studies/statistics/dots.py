@@ -7,14 +7,15 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ir_recorder.report.charts import tick_step
+from ir_recorder.report.bars import tick_step
 from ir_recorder.report.number_text import text
 from ir_studies.statistics.findings import Comparison
 
-WIDTH = 560.0
-LINE = 34.0
-_LEFT = 190.0
-_RIGHT = 30.0
+WIDTH = 420.0  # as narrow as a telephone, so that its letters stay readable there
+LINE = 46.0  # of it the upper part is for the name
+_NAME = 14.0
+_LEFT = 34.0
+_RIGHT = 34.0
 _TOP = 8.0
 _BOTTOM = 48.0
 _INSIDE = (2.0, 98.0)  # percentiles that the axis holds; dots outside are drawn at its edge
@@ -35,7 +36,7 @@ def dots(comparisons: Sequence[Comparison], title: str) -> str:
         inside = min(max(value, low), high)
         return _LEFT + (inside - low) / (high - low) * (WIDTH - _LEFT - _RIGHT)
 
-    lines = "".join(_line(each, _TOP + LINE * (k + 0.5), at) for k, each in enumerate(kept))
+    lines = "".join(_line(each, _TOP + LINE * k, at) for k, each in enumerate(kept))
     said = "; ".join(f"{each.name}: mean {each.mean.value:+.1f} %" for each in kept)
     return (
         f'<div class="figure"><svg class="dots" viewBox="0 0 {WIDTH:g} {height:g}" '
@@ -78,13 +79,14 @@ def _tick(percent: float) -> str:
     return f"{percent:+g}" if percent else "0"
 
 
-def _line(each: Comparison, y: float, at: Callable[[float], float]) -> str:
+def _line(each: Comparison, top: float, at: Callable[[float], float]) -> str:
+    y = top + (LINE + _NAME) / 2.0
     marks = "".join(
         f'<circle cx="{at(value):.1f}" '
         f'cy="{y + _SPREAD * (2.0 * (0.618034 * k % 1.0) - 1.0):.1f}" r="2"/>'
         for k, value in enumerate(each.values.tolist())
     )
-    label = f'<text x="{_LEFT - 10:g}" y="{y + 4:.1f}" text-anchor="end">{text(each.name)}</text>'
+    label = f'<text class="name" x="0" y="{top + _NAME - 2:.1f}">{text(each.name)}</text>'
     if math.isnan(each.mean.low):
         return label + marks
     x = at(each.mean.low)

@@ -8,11 +8,13 @@ from pathlib import Path
 
 from ir_recorder.analysis.intervals import ALIKE, Mean
 from ir_recorder.report.files import write_output
+from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import DASH, significant, text
 from ir_recorder.report.page import PAGE_START
+from ir_recorder.report.paid import Tile, row_of
 from ir_recorder.report.step_table import write_columns
 from ir_recorder.report.tables import table
-from ir_studies.page import page, settings_table
+from ir_studies.page import badge, page, settings_table
 from ir_studies.statistics.dots import dots
 from ir_studies.statistics.findings import ASYNCHRONOUS, SYNCHRONOUS, Comparison, Findings, number
 from ir_studies.statistics.settings import DRAWN, StatisticsSettings
@@ -55,6 +57,8 @@ _PORTFOLIO_RULE = (
     "predicted: a rule, no finding."
 )
 _ONE_ROBOT = f"One robot says little of the predicted interval; plant: {DRAWN} draws one per pair."
+_FIRST = ("duration", "energy, direct")
+"""Comparisons that people look for first."""
 _SCOPE = (
     "Energies are at the mains, controller and tool included, of simulated robots; nothing "
     "follows for other cells or a real robot."
@@ -189,6 +193,8 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
             f"{settings.planner or 'portfolio'}, "
             f"objective {settings.objective}, plant {settings.plant}"
         ),
+        "badge": _badge(found),
+        "tiles": row_of(_tiles(found)),
         "counts": table(("", ">how many"), [(text(a), b) for a, b in counts(found)], "Counts"),
         "verdict": "".join(f"<li>{text(one)}</li>" for one in _in_words(found)),
         "bold": "" if any(each.shown for each in found.comparisons) else ": here none does",
@@ -207,6 +213,36 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
         "settings": settings_table(settings.budget),
     }
     return page("statistics", parts)
+
+
+def _badge(found: Findings) -> str:
+    shown = sum(each.shown for each in found.comparisons)
+    if not shown:
+        return badge("No difference shown", good=False)
+    return badge(f"{counted(shown, 'difference')} shown", good=True)
+
+
+def _tiles(found: Findings) -> list[Tile]:
+    """What people ask first: how many pairs, what asynchronous joints change, how true energies
+    are.
+    """
+    compared = found.solved - found.same
+    both = f"{found.solved} with both timings certified"
+    tiles = [Tile("pairs compared", f"{compared} of {found.pairs}", (both,))]
+    named = [each for each in found.comparisons if each.name in _FIRST]
+    for each in (*named, *found.agreements):
+        if not math.isfinite(each.mean.value):
+            continue
+        within = f"90 % interval {_interval(each.mean)} %" if math.isfinite(each.mean.low) else ""
+        verdict = ""
+        if each in named:
+            verdict = "asynchronous against synchronous"
+            verdict += "" if each.shown else "; no difference shown"
+        tiles.append(Tile(each.name, f"{percent(each.mean.value)} %", (within, verdict)))
+    if found.driven and math.isfinite(found.covered):
+        inside = f"{round(found.covered * found.driven)} of {found.driven}"
+        tiles.append(Tile("measured within the prediction", inside, ("its 90 % interval",)))
+    return tiles
 
 
 def _in_words(found: Findings) -> Iterator[str]:

@@ -13,7 +13,7 @@
     motion = new Motion(find("view"), timeline, data.scene, data.safetyDistance);
     if (data.peak) motion.scale(data.peak);
     motion.blamed = data.blamed; /* bodies that a problem names: in red */
-    find("trail-max").textContent = `${Math.round(motion.mostPower)} W`;
+    find("trail-max").textContent = `${thousands(Math.round(motion.mostPower))} W`;
   } else {
     find("no-motion").hidden = false;
     find("trail-legend").hidden = true;

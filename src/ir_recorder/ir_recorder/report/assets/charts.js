@@ -210,19 +210,19 @@ class TimeChart {
     const step = tickStep(whole / wide);
     g.textAlign = "center";
     let last = -Infinity;
-    for (const [from, to] of long) this.rest(g, this.x(from), this.x(to), to - from, low);
+    for (const [from, to] of long) this.rest(g, this.x(from), this.x(to), to - from);
     g.strokeStyle = css("--line");
     g.fillStyle = css("--soft");
     for (let t = Math.ceil(this.timeline.from / step) * step; t <= this.timeline.to + 1e-9; t += step) {
-      const x = this.x(t), inside = long.some(([from, to]) => t > from && t < to);
-      if (inside || long.some(([from, to]) => Math.abs(x - (this.x(from) + this.x(to)) / 2) < 50) || x - last < 44) continue;
-      last = x;
+      const x = this.x(t), words = this.timeline.tick(t), half = g.measureText(words).width / 2;
+      if (long.some(([from, to]) => t > from && t < to) || x - half < last + 8) continue;
+      last = x + half;
       line(g, x, this.top, x, this.height - this.bottom);
-      g.fillText(this.timeline.tick(t), x, low);
+      g.fillText(words, Math.min(x, this.width - half - 1), low);
     }
   }
-  /* A rest that is shown short: a band with two strokes, and how long it is. */
-  rest(g, from, to, seconds, low) {
+  /* A rest that is shown short: a band with two strokes, and along it how long it is. */
+  rest(g, from, to, seconds) {
     const middle = (from + to) / 2, bottom = this.height - this.bottom;
     g.fillStyle = css("--sky");
     g.fillRect(from, this.top, to - from, bottom - this.top);
@@ -230,8 +230,12 @@ class TimeChart {
     for (const x of [middle - 3, middle + 3]) line(g, x - 3, bottom + 5, x + 3, bottom - 5);
     g.fillStyle = css("--ink");
     const words = seconds < 600 ? `${Math.round(seconds)} s` : `${Math.round(seconds / 60)} min`;
-    const shown = `${words} cut`, half = g.measureText(shown).width / 2;
-    g.fillText(shown, Math.min(middle, this.width - half - 1), low);
+    g.save();
+    g.translate(middle, this.top + 6);
+    g.rotate(-Math.PI / 2);
+    g.textAlign = "right";
+    g.fillText(`${words} cut`, 0, 0);
+    g.restore();
   }
   valueAxis(g, low, high, unit, y) {
     const step = tickStep((high - low) / 5);
@@ -240,8 +244,19 @@ class TimeChart {
       g.strokeStyle = css("--line");
       line(g, this.left, y(v), this.width - this.right, y(v));
       g.fillStyle = css("--soft");
-      g.fillText(`${+v.toFixed(6)} ${unit}`, this.left - 8, y(v));
+      g.fillText(`${thousands(v)} ${unit}`, this.left - 8, y(v));
     }
+  }
+  /* What a line says, on the paper's colour, below the line: curves stay above it. */
+  named(g, words, y) {
+    const wide = g.measureText(words).width, down = Math.min(y + 10, this.height - this.bottom - 8);
+    g.globalAlpha = 0.85;
+    g.fillStyle = css("--card");
+    g.fillRect(this.left + 2, down - 8, wide + 8, 16);
+    g.globalAlpha = 1;
+    g.fillStyle = css("--bad");
+    g.textAlign = "left";
+    g.fillText(words, this.left + 6, down);
   }
   cursor(g) {
     const x = this.x(this.timeline.now);
@@ -267,6 +282,7 @@ class TimeChart {
   }
 }
 
+const thousands = (value) => value.toLocaleString("en", { maximumFractionDigits: 6 }).replaceAll(",", " ").replace(/^-0$/, "0");
 function line(g, x0, y0, x1, y1) { g.beginPath(); g.moveTo(x0, y0); g.lineTo(x1, y1); g.stroke(); }
 function tickStep(raw) {
   const power = 10 ** Math.floor(Math.log10(raw));
@@ -426,9 +442,7 @@ class ClearanceChart extends TimeChart {
       g.lineWidth = 1;
     }
     g.restore();
-    g.fillStyle = css("--bad");
-    g.textAlign = "left";
-    g.fillText(`safety distance ${+(this.bound * 1000).toFixed(1)} mm`, this.left + 6, y(this.bound) - 8);
+    this.named(g, `safety distance ${+(this.bound * 1000).toFixed(1)} mm`, y(this.bound));
     this.cursor(g);
   }
   describe(time) {

@@ -43,7 +43,7 @@ function svgOf(svg) {
   return new XMLSerializer().serializeToString(copy);
 }
 
-/* The bars of joules, which are boxes of the page, as a drawing. */
+/* Bars, which are boxes of the page, as a drawing. */
 function barsToSvg(place) {
   const make = (name, values) => {
     const element = document.createElementNS(SVG, name);
@@ -64,7 +64,10 @@ function barsToSvg(place) {
     for (const piece of row.querySelectorAll(".track > *")) {
       const x = left + parseFloat(piece.style.left) / 100 * wide, style = getComputedStyle(piece);
       if (piece.tagName === "SPAN") put(piece.textContent, x, "middle");
-      else svg.append(make("rect", { x, y: y + 2, width: piece.style.width ? parseFloat(piece.style.width) / 100 * wide : 2, height: 20, fill: style.backgroundColor }));
+      else if (piece.matches(".whisker")) {
+        const span = parseFloat(piece.style.width) / 100 * wide;
+        svg.append(make("path", { d: `M${x} ${y + 7}v10m0 -5h${span}m0 -5v10`, stroke: css("--ink"), "stroke-width": 2, fill: "none" }));
+      } else svg.append(make("rect", { x, y: y + 2, width: piece.style.width ? parseFloat(piece.style.width) / 100 * wide : 2, height: 20, fill: style.backgroundColor, opacity: style.opacity }));
     }
   });
   return svg;
@@ -79,7 +82,17 @@ addEventListener("beforeprint", () => {
 });
 addEventListener("afterprint", () => { for (const part of unfolded) part.open = false; });
 
+/* No number is broken from its thousands or its unit at the end of a line. */
+function unbroken() {
+  const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (walk.nextNode()) {
+    const node = walk.currentNode, words = node.data.replace(/(\d) (?=\d{3}(?!\d)|%|(?:[kM]?Wh|k?[JW]|min|h|s|mm|m|kg|EUR|deg)(?!\w))/g, "$1\u00a0");
+    if (words !== node.data && !node.parentElement.closest("script, style")) node.data = words;
+  }
+}
+
 function exportButtons() {
+  unbroken();
   const button = (label, name, act) => {
     const element = document.createElement("button");
     element.type = "button";
@@ -101,9 +114,9 @@ function exportButtons() {
     const name = svg.id || "figure";
     svg.parentElement.after(button("SVG", name, () => download(fileName(name, "svg"), "image/svg+xml", svgOf(svg))));
   }
-  const bars = document.querySelector("main .joules");
-  if (bars) {
-    const save = () => download("energy_of_movements.svg", "image/svg+xml", new XMLSerializer().serializeToString(barsToSvg(bars)));
-    bars.after(button("SVG", "energy of each movement", save));
+  for (const bars of document.querySelectorAll("main .bars")) {
+    const name = bars.dataset.name;
+    const save = () => download(fileName(name, "svg"), "image/svg+xml", new XMLSerializer().serializeToString(barsToSvg(bars)));
+    bars.after(button("SVG", name, save));
   }
 }

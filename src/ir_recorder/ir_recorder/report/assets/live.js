@@ -199,7 +199,7 @@ class LiveClearanceChart extends ClearanceChart {
   };
   const scale = () => {
     motion.mostPower = mostPower;
-    find("trail-max").textContent = `${Math.round(mostPower)} W`;
+    find("trail-max").textContent = `${thousands(Math.round(mostPower))} W`;
   };
   const update = () => {
     power.show(history);

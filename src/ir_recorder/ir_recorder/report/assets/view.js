@@ -182,7 +182,7 @@ async function events(url, headers, take) {
     if (shown.peak) motion.scale(shown.peak);
     find("no-motion").hidden = true;
     find("trail-legend").hidden = !power.power;
-    find("trail-max").textContent = `${Math.round(motion.mostPower)} W`;
+    find("trail-max").textContent = `${thousands(Math.round(motion.mostPower))} W`;
     sliders(shown.joints);
     timeline.seek(Math.min(timeline.now, timeline.end));
   };
