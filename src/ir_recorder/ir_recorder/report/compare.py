@@ -177,7 +177,7 @@ def _year_bars(
         price = energy.of(costs.money)
         shown = yearly_money(price.value, costs.currency)
         style = "planned" if analysis.program is None else "driven"
-        notes = (f"a year of such cycles, {plant_of(analysis)}", kilowatt_hours(energy.value))
+        notes = (f"a year of such cycles, {cycle.origin}", kilowatt_hours(energy.value))
         piece = Piece(style, shown, price.value)
         rows.append(Row(name, (piece,), shown, notes, whisker=(price.low, price.high)))
     return bars(rows, "a year of such cycles") if len(rows) > 1 else ""

@@ -36,7 +36,7 @@ from ir_recorder.report.number_text import (
     watt_hours,
     watts,
 )
-from ir_recorder.report.tables import bar, table
+from ir_recorder.report.tables import COMPACT, bar, table
 from ir_values.errors import InvalidValueError, IrError
 from ir_values.files import ANYWHERE, FileRoots
 from ir_values.settings import Setting, check_settings, describe, setting
@@ -667,5 +667,5 @@ def _idle(analysis: Analysis, costs: Costs) -> str:
         "shifts (nights, weekends, holidays): at machine home, by the data of controller and "
         "tool. Left alone, the controller only closes the brakes. "
         f"{text(idle_sentence(idle_saving(found, costs), costs))}</p>"
-        f"{table(heads, rows, 'When nobody works')}"
+        f"{table(heads, rows, 'When nobody works', COMPACT)}"
     )

@@ -35,6 +35,8 @@ LONGEST_TEXT = 500  # characters of one warning
 
 
 _NARROW = 2  # columns: a phone shows each row of wider tables as a card
+COMPACT = "compact"
+"""The kind of a wider table whose cells are short: it stays a table on a phone."""
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]], caption: str, kind: str = "") -> str:
@@ -52,7 +54,7 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]], caption: str, kin
         return '<p class="empty">Nothing was recorded.</p>'
     head = f"<thead><tr>{columns}</tr></thead>"
     named = f'<caption class="unseen">{text(caption)}</caption>'
-    wide = "cards" if len(heads) > _NARROW else ""
+    wide = "cards" if len(heads) > _NARROW and kind != COMPACT else ""
     return (
         f'<div class="scroll" tabindex="0" role="region" aria-label="{text(caption)}"><table '
         f'class="{f"{kind} {wide}".strip()}">{named}{head}<tbody>{body}</tbody></table></div>'

@@ -12,7 +12,7 @@ from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.production import Amount, production_of, saved_amount
 from ir_recorder.report.costs import Costs
 from ir_recorder.report.number_text import text
-from ir_recorder.report.tables import table
+from ir_recorder.report.tables import COMPACT, table
 
 _NAMES = {
     "robots": "robots",
@@ -120,7 +120,7 @@ def line_section(found: WholeLine | None, costs: Costs) -> str:
     return (
         '<section id="whole-line"><h2>Of the whole line</h2>'
         f'<p class="hint">{text(hint)} {origin}</p>'
-        f"{table(heads, rows, 'Of the whole line')}</section>"
+        f"{table(heads, rows, 'Of the whole line', COMPACT)}</section>"
     )
 
 
