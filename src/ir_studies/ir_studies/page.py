@@ -26,7 +26,9 @@ def page(kind: str, parts: Mapping[str, str], button: str = "") -> str:
     """
     own = files("ir_studies") / kind
     shell = (files("ir_studies") / "page.html").read_text("utf-8")
+    export = f"<script>{asset('export.js')}\nexportButtons();</script>\n"
     inner = {
+        "export": "" if button else export,
         "style": asset("page.css"),
         "own_style": (own / "page.css").read_text("utf-8"),
         "badge": "",

@@ -50,11 +50,11 @@ function barsToSvg(place) {
     for (const [key, value] of Object.entries(values)) element.setAttribute(key, value);
     return element;
   };
-  const rows = [...place.querySelectorAll(".row")], wide = 560, left = 220;
+  const rows = [...place.querySelectorAll(".row")], wide = 560, left = 220, ink = getComputedStyle(place).color;
   const svg = make("svg", { viewBox: `0 0 ${left + wide + 120} ${rows.length * 26 + 8}` });
   rows.forEach((row, k) => {
     const y = 4 + k * 26, put = (words, x, anchor) => {
-      const text = make("text", { x, y: y + 16, "text-anchor": anchor, "font-size": 12, fill: css("--ink"), "font-family": "sans-serif" });
+      const text = make("text", { x, y: y + 16, "text-anchor": anchor, "font-size": 12, fill: ink, "font-family": "sans-serif" });
       text.textContent = words;
       svg.append(text);
     };
@@ -66,7 +66,7 @@ function barsToSvg(place) {
       if (piece.tagName === "SPAN") put(piece.textContent, x, "middle");
       else if (piece.matches(".whisker")) {
         const span = parseFloat(piece.style.width) / 100 * wide;
-        svg.append(make("path", { d: `M${x} ${y + 7}v10m0 -5h${span}m0 -5v10`, stroke: css("--ink"), "stroke-width": 2, fill: "none" }));
+        svg.append(make("path", { d: `M${x} ${y + 7}v10m0 -5h${span}m0 -5v10`, stroke: ink, "stroke-width": 2, fill: "none" }));
       } else svg.append(make("rect", { x, y: y + 2, width: piece.style.width ? parseFloat(piece.style.width) / 100 * wide : 2, height: 20, fill: style.backgroundColor, opacity: style.opacity }));
     }
   });
