@@ -227,7 +227,9 @@ EXPERIMENTS = (
         "The genetic algorithm as it is, without the modification of eq. (7), is ineffective in "
         "closed zones.",
         f"Stations of {', '.join(STATIONS)} and of {VARIANTS} variants of each per seed. Where eq. "
-        "(7) leaves the zone, the genetic correction of section IV is asked for the same movement, "
+        "(7) leaves the zone, the genetic correction of section IV, with this project's defaults "
+        "(islands, and children pushed apart from what they touch: more than a plain genetic "
+        "algorithm), is asked for the same movement, "
         f"from the station to the configuration outside that eq. (7) found, with {EDGES} checks "
         f"for either. Ineffective: it leaves in at most {HALF:g} % of the searches. {MARGIN}",
         measure_closed,
