@@ -19,8 +19,10 @@ import re
 import sys
 import tempfile
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import coal
 import numpy as np
@@ -49,7 +51,7 @@ class Judge:
         above = [*source.urdf.resolve().parents][:6]
         packages = [str(each) for each in (source.packages, *above) if each is not None]
         with tempfile.NamedTemporaryFile("w", suffix=".urdf") as file:
-            file.write(urdf_text(source))
+            file.write(_with_own_package(urdf_text(source), above))
             file.flush()
             self.model = pinocchio.buildModelFromUrdf(file.name)
             self.shapes = pinocchio.buildGeomFromUrdf(
@@ -142,6 +144,18 @@ class Judge:
         along = (points - placed.translation) @ axis
         beside = np.linalg.norm(np.cross(points - placed.translation, axis), axis=1)
         return np.stack([along, beside], axis=1)
+
+
+def _with_own_package(text: str, above: Sequence[Path]) -> str:
+    """The URDF with places of its own package, whose folder may have another name than the
+    package: its package.xml says which.
+    """
+    for folder in above:
+        described = folder / "package.xml"
+        if described.is_file():
+            name = ElementTree.parse(described).findtext("name", "").strip()
+            return text.replace(f"package://{name}/", f"file://{folder}/")
+    return text
 
 
 def _mixed_up(path: str) -> bool:
