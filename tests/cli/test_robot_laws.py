@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +18,7 @@ from scipy.spatial import ConvexHull
 from ir_cli.home_posture import ROOMS
 from ir_cli.main import main
 from ir_cli.robot_from_urdf import RobotSource, made_robot
-from ir_cli.self_pairs import SAFETY
+from ir_cli.self_pairs import SAFETY, pairs_of
 from ir_description.files.making import urdf_arm
 from ir_description.robot import ReducedDistance
 from ir_kernels import Chain, CollisionModel
@@ -279,6 +280,27 @@ def test_links_that_lie_in_each_other_but_never_meet_keep_their_postures(tmp_pat
     assert all("were not seen to meet" in each.reason for each in nested)
     good, line = verdict(Judge(source, made), made.robot, POSTURES)
     assert good, line
+
+
+def test_a_capsule_whose_link_lies_in_narrower_ones_takes_no_postures(tmp_path: Path) -> None:
+    """It stands for nothing that could meet; one of a link without a body may not overlap."""
+    ball = '<geometry><sphere radius="0.05"/></geometry>'
+    path = tmp_path / "balls.urdf"
+    path.write_text(re.sub("<geometry>.*?</geometry>", ball, urdf(1)))
+    made = made_robot(RobotSource(path, payload=5.0, mass=60.0))
+    wide = next(each for each in made.shapes.capsules if each.link == 2)
+    wide = replace(wide, name="wide", radius=0.6)
+    capsules = (*made.shapes.capsules, wide)
+    limits = made.robot.position_min, made.robot.position_max
+    held = pairs_of(made.arm, capsules, made.bodies, *limits, None)
+    own = [each for each in held.reduced if "wide" in each[:2]]
+    assert own
+    assert all("were not seen to meet" in each.reason for each in own)
+    assert all(each.distance < 0.0 for each in own)
+    bare = pairs_of(made.arm, capsules, (*made.bodies[:2], (), *made.bodies[3:]), *limits, None)
+    own = [each for each in bare.reduced if "wide" in each[:2]]
+    assert own
+    assert all(each.distance >= 0.0 for each in own)
 
 
 def coal_distance(shapes: object, placed: object, a: object, b: object) -> float:

@@ -9,12 +9,22 @@ from typing import NamedTuple
 import numpy as np
 
 from ir_description import Capsule
-from ir_description.files.making import CapsuleFit, LinkBody, UrdfArm, encloses, fitted
+from ir_description.files.convex_pieces import fine_triangles
+from ir_description.files.making import (
+    CapsuleFit,
+    LinkBody,
+    UrdfArm,
+    encloses,
+    fitted,
+    with_overhang,
+)
 from ir_kernels import Chain
 from ir_values.arrays import FloatArray
 
 WRITTEN = 1e-9  # m: by which the digits of a file may move a capsule
-_FINER = (10, 0.01)  # capsules of a link at most, and what one must save, where that helps
+_AT_JOINT = (6, 0.01)  # capsules at a joint at most, and what one must save, where that helps
+_ELSEWHERE = (4, 0.01)
+_AROUND = 1.2  # of a link's radius: what is that near to a joint is looked at more closely
 _LONG = 5e-3  # m: a link without a body that is shorter needs no capsule
 
 
@@ -36,23 +46,28 @@ def capsules_of(
     names: Sequence[str],
     radii: FloatArray | None,
     before: Shapes | None = None,
-    finer: Set[int] = frozenset(),
+    finer: Set[tuple[int, int]] = frozenset(),
 ) -> Shapes:
     """Fitted to the bodies of each link; without any, from its joint to the next with the sheet's
     radius (7,), or with that of the link before. before: those of all links, of which only the
-    links in `finer` get more and tighter ones.
+    pairs of links in `finer` get more and tighter ones, above all at the joints between them.
     """
     capsules: list[Capsule] = []
     sentences: list[str] = []
+    earlier = () if before is None else before.capsules
     for k, own in enumerate(bodies):
-        if before is not None and k not in finer:
-            capsules += [each for each in before.capsules if each.link == k]
+        ends = [k == lower for lower, upper in finer if k in (lower, upper)]
+        if before is not None and not ends:
+            capsules += [each for each in earlier if each.link == k]
             sentences += before.of(names[k])
             continue
         to = arm.origin[k] if k < len(arm.origin) else np.zeros(3)
         wider = arm.rounding + max((body.beside for body in own), default=0.0) + WRITTEN
         if own:
-            fits, said = _fits(own, to, wider, k in finer)
+            joints = [to if is_lower else np.zeros(3) for is_lower in sorted(set(ends))]
+            radii_before = [each.radius for each in earlier if each.link == k]
+            near = _AROUND * max(radii_before, default=0.0)
+            fits, said = _fits(own, to, wider, joints, near)
         else:
             fits, said = _without_body(to, k, capsules, radii)
             if not fits:
@@ -66,10 +81,14 @@ def capsules_of(
 
 
 def _fits(
-    bodies: Sequence[LinkBody], to: FloatArray, wider: float, fine: bool
+    bodies: Sequence[LinkBody],
+    to: FloatArray,
+    wider: float,
+    joints: Sequence[FloatArray],
+    near: float,
 ) -> tuple[list[CapsuleFit], list[str]]:
     """Capsules of a link's bodies, with words on each; to (3,): the next joint; wider [m]: by what
-    their radii will be larger.
+    their radii will be larger; joints: within `near` [m] of which they are to be tighter.
     """
     fits: list[CapsuleFit] = []
     said: list[str] = []
@@ -77,7 +96,7 @@ def _fits(
     if around:
         slack = max(body.slack for body in around) + wider
         triangles = np.concatenate([body.triangles for body in around])
-        fits += fitted(triangles, to, *(_FINER if fine else ()))
+        fits += _tight(triangles, to, joints, near) if joints else fitted(triangles, to)
         stands = [f"stands out {_millimetres(fit.overhang + slack)} mm at most" for fit in fits]
         holds = f"{around[0].place}" if len(around) == 1 else f"{len(around)} bodies"
         said += [f"{words} from what it encloses: {holds}" for words in stands]
@@ -91,6 +110,22 @@ def _fits(
         else:
             said[home] += f", {body.place}"
     return fits, said
+
+
+def _tight(
+    triangles: FloatArray, to: FloatArray, joints: Sequence[FloatArray], around: float
+) -> tuple[CapsuleFit, ...]:
+    """Capsules of triangles (T, 3, 3), of which those at the joints have their own."""
+    left = fine_triangles(triangles, 0.2 * around)
+    fits: list[CapsuleFit] = []
+    for joint in joints:
+        there = np.linalg.norm(left.mean(axis=1) - joint, axis=1) < around
+        if there.any():
+            fits += fitted(left[there], to, *_AT_JOINT)
+        left = left[~there]
+    if len(left):
+        fits += fitted(left, to, *_ELSEWHERE)
+    return with_overhang(fits, triangles)
 
 
 def _millimetres(length: float) -> int:

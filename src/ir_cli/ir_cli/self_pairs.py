@@ -10,6 +10,7 @@ the narrowest that holds it. Pieces within their radii are told apart by their t
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Sequence, Set
 from typing import NamedTuple
 
@@ -60,12 +61,13 @@ _AT_ONCE = (30, 300)  # pieces, the nearest first, before all others are looked 
 
 class Pairs(NamedTuple):
     """Pairs of capsules that can touch; those of them that keep a distance of their own; unclear:
-    links whose capsules leave hardly a posture, or forbid the given home.
+    pairs of links, the lower one first, whose capsules leave hardly a posture, or forbid the given
+    home.
     """
 
     pairs: tuple[tuple[str, str], ...]
     reduced: tuple[ReducedDistance, ...]
-    unclear: frozenset[int] = frozenset()
+    unclear: frozenset[tuple[int, int]] = frozenset()
 
 
 def pairs_of(
@@ -75,10 +77,10 @@ def pairs_of(
     low: FloatArray,
     high: FloatArray,
     home: FloatArray | None,
-    finer: Set[int] = frozenset(),
+    finer: Set[tuple[int, int]] = frozenset(),
 ) -> Pairs:
-    """All pairs of capsules of links that are no neighbours; home: a given one [rad]; finer: links
-    whose surfaces are looked at in small pieces.
+    """All pairs of capsules of links that are no neighbours; home: a given one [rad]; finer: pairs
+    of links whose surfaces are looked at in small pieces.
     """
     far = [
         (a.name, b.name)
@@ -91,25 +93,26 @@ def pairs_of(
     q = np.random.default_rng(0).uniform(low, high, (POSTURES, len(low)))
     distance = model.distances(q)
     named = {capsule.name: capsule for capsule in capsules}
-    surfaces = _Surfaces(arm, capsules, bodies, finer)
+    surfaces = _Surfaces(arm, capsules, bodies, {link for pair in finer for link in pair})
     groups: dict[tuple[int, int], list[int]] = {}
     for z, (_, first, second) in enumerate(model.pairs):
         if float((distance[:, z] <= SAFETY).mean()) > NEAR:
             one, other = sorted((named[first].link, named[second].link))
             groups.setdefault((one, other), []).append(z)
     reduced = []
-    unclear: set[int] = set()
+    unclear: set[tuple[int, int]] = set()
     for links, near in groups.items():
+        rings = _Rings(chain, *links, surfaces)
         own = []
         for z in near:
             pair = (named[name] for name in model.pairs[z][1:])
             lower, upper = sorted(pair, key=lambda each: each.link)
-            own.append(_own_distance(distance[:, z], _Meeting(chain, lower, upper, surfaces, q)))
+            own.append(_own_distance(distance[:, z], _Meeting(chain, lower, upper, rings, q)))
         kept = np.array([each for each, _ in own])
         left = float((distance[:, near] > kept).all(axis=1).mean())
         free_at_home = home is None or (model.distances(home[None])[0, near] > kept).all()
         if left < LEAST_LEFT or not free_at_home:
-            unclear.update(links)
+            unclear.add(links)
         for z, (each, reason) in zip(near, own, strict=True):
             said = f"{reason}; leaves {100.0 * left:.1f} %" if left < LEAST_LEFT else reason
             reduced.append(ReducedDistance(*model.pairs[z][1:], each, said))
@@ -198,6 +201,27 @@ class _Surface:
         self._radius = _radii(self.pieces.triangles, self._centre) + self.pieces.beside
         self._facets = cKDTree(self._centre)
 
+    def near(self, other: _Surface, facing: Capsule, pose: FloatArray) -> IntArray:
+        """Pieces that may meet another surface, which stands for a capsule, by their radii, the
+        nearest first; pose: of this one in the other one.
+        """
+        middle = pose[:3, :3].T @ (0.5 * (facing.p0 + facing.p1) - pose[:3, 3])
+        reach = 0.5 * float(np.linalg.norm(facing.p1 - facing.p0)) + facing.radius
+        radius = self.pieces.radius
+        widest = float(radius.max(initial=0.0))
+        chosen = np.array(self.tree.query_ball_point(middle, reach + widest), dtype=int)
+        at = self.pieces.at[chosen] @ pose[:3, :3].T + pose[:3, 3]
+        inside = beside_axis(at, facing.p0, facing.p1) <= facing.radius + radius[chosen]
+        chosen = chosen[inside]
+        if not (len(chosen) and len(other.pieces.at)):
+            return chosen[:0]
+        most = float(other.pieces.radius.max())
+        limit = most + float(radius[chosen].max())
+        far, _ = other.tree.query(at[inside], distance_upper_bound=limit)
+        beyond = far - radius[chosen] - most
+        order = np.argsort(beyond, kind="stable")
+        return np.asarray(chosen[order][beyond[order] <= 0.0])
+
     def meeting(
         self, chosen: IntArray, pose: FloatArray, other: _Surface, near: float, first: bool
     ) -> tuple[IntArray, int]:
@@ -264,10 +288,20 @@ class _Surfaces:
         self._bodies = bodies
         self._known: dict[str, _Surface] = {}
 
+    def capsules(self, link: int) -> list[Capsule]:
+        """Those of a link."""
+        return [each for each in self._capsules if each.link == link]
+
+    def has_body(self, link: int) -> bool:
+        """Whether the URDF has a shape for it."""
+        return bool(self._bodies[link])
+
     def of(self, capsule: Capsule) -> _Surface:
-        """What a capsule stands for; of a link without a body, nothing."""
+        """What a capsule stands for: nothing for a link without a body, or where the others of its
+        link are narrower and hold all.
+        """
         if capsule.name not in self._known:
-            own = [each for each in self._capsules if each.link == capsule.link]
+            own = self.capsules(capsule.link)
             for each, pieces in zip(own, self._shared(own), strict=True):
                 self._known[each.name] = _Surface(pieces)
         return self._known[capsule.name]
@@ -353,51 +387,120 @@ def _thinned(rows: IntArray, most: int) -> IntArray:
     return rows[:: max(1, len(rows) // most)]
 
 
+class _Rings:
+    """Rings about the joint that leads from a link towards another one, in which their surfaces
+    meet by construction, as a shaft in its housing: what turns in something meets it all around.
+    """
+
+    def __init__(self, chain: Chain, first: int, second: int, surfaces: _Surfaces) -> None:
+        self.surfaces = surfaces
+        self._chain = chain
+        self._links = (first, second)
+        self._counts: tuple[Counter[tuple[float, ...]], ...] = ()
+
+    def away(self, side: int, pieces: _Pieces, q: FloatArray) -> BoolArray:
+        """Which pieces (N,) of the first link, or of the second, lie beside no ring that is built
+        so, as seen in postures q.
+        """
+        if not self._counts:
+            self._counts = self._counted(q)
+        count = self._counts[side]
+        usual = [ring for ring, times in count.items() if times >= _BUILT_SO * len(q)]
+        places, of = self._cells(side, pieces.at)
+        if not (len(usual) and len(places)):
+            return np.ones(len(of), dtype=bool)
+        far, _ = cKDTree(np.array(usual)).query(places)
+        return np.asarray(far > _BESIDE / _RING)[of]
+
+    def _counted(self, q: FloatArray) -> tuple[Counter[tuple[float, ...]], ...]:
+        """In how many postures a piece of each ring of both links meets the other link, or nearly
+        does: with any of its capsules.
+        """
+        counts: tuple[Counter[tuple[float, ...]], ...] = (Counter(), Counter())
+        sides = [self.surfaces.capsules(link) for link in self._links]
+        for poses in _relative(self._chain, *self._links, q):
+            met: tuple[set[tuple[float, ...]], ...] = (set(), set())
+            for pair in itertools.product(*sides):
+                for side in (0, 1):
+                    own = self.surfaces.of(pair[side])
+                    other = self.surfaces.of(pair[1 - side])
+                    near = own.near(other, pair[1 - side], poses[side])
+                    chosen, _ = own.meeting(
+                        _thinned(near, _IN_RINGS), poses[side], other, _ROUGHLY, first=False
+                    )
+                    places, _ = self._cells(side, own.pieces.at[chosen])
+                    met[side].update(map(tuple, places))
+            for count, rings in zip(counts, met, strict=True):
+                count.update(rings)
+        return counts
+
+    def _cells(self, side: int, points: FloatArray) -> tuple[FloatArray, IntArray]:
+        """Rings (M, 2), along the axis and beside it [widths of a ring], and which of them points
+        (N, 3) of a link lie in.
+        """
+        link = self._links[side]
+        joint = link if side == 0 else link - 1
+        poses = self._chain.link_poses(np.zeros((1, self._chain.n)))[0]
+        own = poses[link]
+        axis = own[:3, :3].T @ poses[joint + 1, :3, :3] @ self._chain.joint_axis[joint]
+        foot = own[:3, :3].T @ (poses[joint + 1, :3, 3] - own[:3, 3])
+        along = (points - foot) @ axis
+        beside = np.linalg.norm(points - foot - along[:, None] * axis, axis=1)
+        cells = np.floor(np.stack([along, beside], axis=1) / _RING)
+        rings, of = np.unique(cells, axis=0, return_inverse=True)
+        return rings, np.asarray(of).ravel()
+
+
+def _relative(chain: Chain, one: int, other: int, q: FloatArray) -> FloatArray:
+    """Poses (N, 2, 4, 4) of each of two links in the other one."""
+    first, second = (chain.link_poses(q)[:, link] for link in (one, other))
+    there = np.linalg.inv(second) @ first
+    return np.stack([there, np.linalg.inv(there)], axis=1)
+
+
 class _Meeting:
     """Postures in which what two capsules stand for meets, of a link and of one beyond the next.
 
-    built_so: what of it is left out because they are built so, as a shaft in its housing, in words;
-    "" for nothing. Places are rings about the joint that leads from one link towards the other one:
-    what turns in something meets it all around. Of the other rings of both surfaces counts what
-    meets anything.
+    built_so: what of it is left out because they are built so, in words; "" for nothing. Of what
+    lies away from such rings counts what meets anything.
     """
 
     def __init__(
-        self, chain: Chain, one: Capsule, other: Capsule, surfaces: _Surfaces, q: FloatArray
+        self,
+        chain: Chain,
+        one: Capsule,
+        other: Capsule,
+        rings: _Rings,
+        q: FloatArray,
     ) -> None:
         self._chain = chain
         self._capsules = (one, other)
         self._model = CollisionModel(chain, (one, other), (), [(one.name, other.name)])
         self._q = q
         self._joints = np.arange(one.link, other.link)
-        self._surfaces = (surfaces.of(one), surfaces.of(other))
+        self._rings = rings
+        self._surfaces = (rings.surfaces.of(one), rings.surfaces.of(other))
         self._sides = tuple(each.pieces for each in self._surfaces)
         self._counted = tuple(np.ones(len(each.at), dtype=bool) for each in self._sides)
-        rings = [
-            _rings(pieces.at, *axis)
-            for pieces, axis in zip(self._sides, self._axes(one.link, other.link), strict=True)
-        ]
-        self._rings = tuple(each for each, _ in rings)
-        self._ring_of = tuple(each for _, each in rings)
         self.built_so = ""
         self._left = _TRIANGLES
 
     def largest_distance(self, usual: float) -> float:
         """What the capsules are apart at most [m] where the bodies meet, in all postures that were
-        looked at, most of which keep `usual` [m]: -inf where they never do, 0 for capsules without
+        looked at, most of which keep `usual` [m]: -inf where they never do, 0 for links without
         bodies.
         """
-        if not all(len(each.at) for each in self._sides):
+        if not all(self._rings.surfaces.has_body(each.link) for each in self._capsules):
             return 0.0
-        few = self._q[:_COUNTED]
+        if not all(len(each.at) for each in self._sides):
+            return -np.inf
         distance = self._distances(self._q)
         found = self._found(distance, usual)
         if float((distance > found).mean()) >= _LEFT:
             return found
-        times = self._times_that_rings_meet(few)
         self._counted = tuple(
-            _away(rings, each >= _BUILT_SO * len(few))[self._ring_of[side]]
-            for side, (rings, each) in enumerate(zip(self._rings, times, strict=True))
+            self._rings.away(side, pieces, self._q[:_COUNTED])
+            for side, pieces in enumerate(self._sides)
         )
         if all(each.all() for each in self._counted):
             return found
@@ -458,7 +561,8 @@ class _Meeting:
         fewer = int(np.argmin([len(each.at) for each in self._sides]))
         sides = (0, 1) if self.built_so else (fewer,)
         result = np.zeros(len(q), dtype=bool)
-        for k, poses in enumerate(self._relative(q)):
+        one, other = (each.link for each in self._capsules)
+        for k, poses in enumerate(_relative(self._chain, one, other, q)):
             result[k] = any(self._meets(side, poses[side]) for side in sides)
         return result
 
@@ -466,8 +570,9 @@ class _Meeting:
         """Whether a piece of a side that counts meets the other one; after very many pairs of
         triangles, whether it may by its radius.
         """
-        chosen = self._near(side, pose)
         other = self._surfaces[1 - side]
+        chosen = self._surfaces[side].near(other, self._capsules[1 - side], pose)
+        chosen = chosen[self._counted[side][chosen]]
         for begin, end in itertools.pairwise((0, *_AT_ONCE, len(chosen))):
             some = chosen[begin:end]
             if not len(some):
@@ -479,78 +584,3 @@ class _Meeting:
             if len(met):
                 return True
         return False
-
-    def _relative(self, q: FloatArray) -> FloatArray:
-        """Poses (N, 2, 4, 4) of each link in the other one."""
-        first, second = (self._chain.link_poses(q)[:, each.link] for each in self._capsules)
-        there = np.linalg.inv(second) @ first
-        return np.stack([there, np.linalg.inv(there)], axis=1)
-
-    def _near(self, side: int, pose: FloatArray) -> IntArray:
-        """Pieces of a side that may meet the other one by their radii, the nearest first; pose: of
-        their link in the other one.
-        """
-        facing = self._capsules[1 - side]
-        own = self._sides[side]
-        middle = pose[:3, :3].T @ (0.5 * (facing.p0 + facing.p1) - pose[:3, 3])
-        reach = 0.5 * float(np.linalg.norm(facing.p1 - facing.p0)) + facing.radius
-        near = self._surfaces[side].tree.query_ball_point(middle, reach + float(own.radius.max()))
-        chosen = np.array(near, dtype=int)
-        chosen = chosen[self._counted[side][chosen]]
-        at = own.at[chosen] @ pose[:3, :3].T + pose[:3, 3]
-        inside = beside_axis(at, facing.p0, facing.p1) <= facing.radius + own.radius[chosen]
-        if not inside.any():
-            return chosen[:0]
-        chosen = chosen[inside]
-        most = float(self._sides[1 - side].radius.max())
-        limit = most + float(own.radius[chosen].max())
-        far, _ = self._surfaces[1 - side].tree.query(at[inside], distance_upper_bound=limit)
-        beyond = far - own.radius[chosen] - most
-        order = np.argsort(beyond, kind="stable")
-        return np.asarray(chosen[order][beyond[order] <= 0.0])
-
-    def _times_that_rings_meet(self, q: FloatArray) -> list[IntArray]:
-        """In how many postures some piece of each ring meets the other side, or nearly does."""
-        counts = [np.zeros(len(rings), dtype=int) for rings in self._rings]
-        for poses in self._relative(q):
-            for side, ring in enumerate(self._ring_of):
-                met, _ = self._surfaces[side].meeting(
-                    _thinned(self._near(side, poses[side]), _IN_RINGS),
-                    poses[side],
-                    self._surfaces[1 - side],
-                    _ROUGHLY,
-                    first=False,
-                )
-                counts[side][np.unique(ring[met])] += 1
-        return counts
-
-    def _axes(self, first: int, second: int) -> list[tuple[FloatArray, FloatArray]]:
-        """A point and the direction of the joint after the first link, and of the one before the
-        second, in the frame of the link.
-        """
-        poses = self._chain.link_poses(np.zeros((1, self._q.shape[1])))[0]
-        found = []
-        for link, joint in ((first, first), (second, second - 1)):
-            own = poses[link]
-            axis = own[:3, :3].T @ poses[joint + 1, :3, :3] @ self._chain.joint_axis[joint]
-            found.append((own[:3, :3].T @ (poses[joint + 1, :3, 3] - own[:3, 3]), axis))
-        return found
-
-
-def _rings(points: FloatArray, foot: FloatArray, axis: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Rings (M, 2) about an axis, along and beside it [m], and which of them points (N, 3) lie
-    in.
-    """
-    along = (points - foot) @ axis
-    beside = np.linalg.norm(points - foot - along[:, None] * axis, axis=1)
-    cells = np.floor(np.stack([along, beside], axis=1) / _RING)
-    rings, of = np.unique(cells, axis=0, return_inverse=True)
-    return _RING * rings, np.asarray(of).ravel()
-
-
-def _away(rings: FloatArray, built_so: BoolArray) -> BoolArray:
-    """Which of the rings (M, 2) lie beside none that is built so (M,)."""
-    if not built_so.any():
-        return np.ones(len(rings), dtype=bool)
-    far, _ = cKDTree(rings[built_so]).query(rings)
-    return np.asarray(far > _BESIDE)

@@ -1,6 +1,12 @@
 """A robot file from a URDF and what is known of its drives."""
 
-from ir_description.files.making.capsule_fit import CapsuleFit, beside_axis, encloses, fitted
+from ir_description.files.making.capsule_fit import (
+    CapsuleFit,
+    beside_axis,
+    encloses,
+    fitted,
+    with_overhang,
+)
 from ir_description.files.making.estimates import holding_torques, with_masses
 from ir_description.files.making.link_bodies import LinkBody, Meshes, link_bodies
 from ir_description.files.making.robot_text import (
@@ -37,4 +43,5 @@ __all__ = [
     "urdf_arm",
     "with_home",
     "with_masses",
+    "with_overhang",
 ]
