@@ -303,6 +303,42 @@ def test_a_capsule_whose_link_lies_in_narrower_ones_takes_no_postures(tmp_path: 
     assert all(each.distance >= 0.0 for each in own)
 
 
+@pytest.mark.long
+def test_a_flat_end_at_a_joint_beside_a_box_leaves_postures(tmp_path: Path) -> None:
+    """Ends of capsules stand out of both, so that these overlap alike in every posture."""
+    from judge_robots import Judge, verdict
+
+    places = ("0 0 0.3", "0.1 0 0.2", "0 0 0.6", "0 0 0.05", "0.6 0 0", "0.1 0 0")
+    bodies = (
+        '<origin xyz="0 0 0.15"/><geometry><cylinder radius="0.12" length="0.3"/></geometry>',
+        '<geometry><box size="0.2 0.2 0.2"/></geometry>',
+        '<origin xyz="0 0 0.3"/><geometry><cylinder radius="0.07" length="0.6"/></geometry>',
+        '<geometry><box size="0.16 0.16 0.16"/></geometry>',
+        '<origin xyz="0.3 0 0"/><geometry><box size="0.5 0.12 0.12"/></geometry>',
+        '<origin xyz="0.03 0 0"/><geometry><sphere radius="0.06"/></geometry>',
+        '<origin xyz="-0.02 0 0"/><geometry><cylinder radius="0.04" length="0.04"/></geometry>',
+    )
+    names = ["base_link", *(f"link_{k}" for k in range(1, 7))]
+    lines = ['<robot name="flat">']
+    lines += [
+        f'<link name="{name}"><collision>{body}</collision></link>'
+        for name, body in zip(names, bodies, strict=True)
+    ]
+    lines += [
+        f'<joint name="joint_{k + 1}" type="revolute"><parent link="{names[k]}"/>'
+        f'<child link="{names[k + 1]}"/><origin xyz="{places[k]}"/><axis xyz="{AXES[k]}"/>'
+        '<limit lower="-2.4" upper="2.4" effort="0" velocity="2"/></joint>'
+        for k in range(6)
+    ]
+    path = tmp_path / "flat.urdf"
+    path.write_text("\n".join([*lines, "</robot>"]))
+    source = RobotSource(path, payload=5.0, mass=60.0)
+    made = made_robot(source)
+    assert not made.pairs.unclear
+    good, line = verdict(Judge(source, made), made.robot, POSTURES)
+    assert good, line
+
+
 def coal_distance(shapes: object, placed: object, a: object, b: object) -> float:
     i = shapes.getGeometryId(a.name)  # type: ignore[attr-defined]
     j = shapes.getGeometryId(b.name)  # type: ignore[attr-defined]
