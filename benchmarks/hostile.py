@@ -143,9 +143,10 @@ def sequence_row(count: int, steps: int) -> dict[str, Any]:
 def walk_rows(depth: int) -> Iterator[dict[str, Any]]:
     """All interleavings of PLC, two clients, program and modes to this depth, from each mode."""
     module = law()
+    seen: dict[int, int] = {}
     for start in module.STARTS:
         began = time.process_time()
-        states, steps, wrong = module.walked(start, depth)
+        states, steps, wrong = module.walked(start, depth, seen)
         for found in wrong[:3]:
             print(found)
         yield {

@@ -5,7 +5,6 @@ Everything that decides is the driver's own; the robot is a flag that says which
 
 from __future__ import annotations
 
-import copy
 from contextlib import suppress
 from typing import Any
 
@@ -22,6 +21,13 @@ SETTINGS = SimulationSettings(transitions=TransitionTimes(), plc=PlcSettings(sta
 
 
 QUARTER = 0.25  # s: no time of a mode ends within a quarter, nor do eight waits of 21 ms reach one
+
+
+def same(thing: Any) -> Any:
+    """A copy of an object whose fields are shared; `copy.copy` takes three times as long."""
+    new = object.__new__(type(thing))
+    new.__dict__.update(thing.__dict__)
+    return new
 
 
 class Silent:
@@ -43,24 +49,24 @@ class Core:
 
     def clone(self) -> Core:
         """The same state again."""
-        new = copy.copy(self)
-        plc = copy.copy(self.plc)
+        new = same(self)
+        plc = same(self.plc)
         new.plc = plc
-        plc.stop = copy.copy(plc.stop)
+        plc.stop = same(plc.stop)
         plc._ages = dict(plc._ages)
         plc._rose = dict(plc._rose)
         plc._gave = {bit: set(givers) for bit, givers in plc._gave.items()}
         plc.off_by = set(plc.off_by)
-        control = copy.copy(self.control)
+        control = same(self.control)
         new.control = control
         control._plc = plc
-        control.modes = copy.copy(control.modes)
-        control.latches = copy.copy(control.latches)
-        control.pauses = copy.copy(control.pauses)
+        control.modes = same(control.modes)
+        control.latches = same(control.latches)
+        control.pauses = same(control.pauses)
         control.pauses._modes = control.modes
         control.pauses._plc = plc
-        new.queue = copy.copy(self.queue)
-        new.queue._waiting = {k: copy.copy(each) for k, each in self.queue._waiting.items()}
+        new.queue = same(self.queue)
+        new.queue._waiting = {k: same(each) for k, each in self.queue._waiting.items()}
         return new
 
     @property
