@@ -66,7 +66,7 @@ DRIVER = Rights(
         *(names.JOINT_STATES, names.ROBOT_DESCRIPTION, names.TF, names.TF_STATIC, "/clock"),
         *(names.POWER_STATE, names.CONTROLLER_STATE, names.CONTROLLER_TIMERS, names.CARRIED_LOAD),
         *(names.PLC_OUTPUTS, names.PLC_INPUTS_IN_FORCE, names.ROBOT_MARKERS, names.STOP_NUMBER),
-        *(names.PLANT, names.LOAD_CHECK, names.CONTACTS, names.MACHINE_STATES),
+        *(names.PLANT, names.LOAD_CHECK, names.CONTACTS, names.MACHINE_STATES, names.STOP_LATCHED),
     ),
     subscribe=(
         *(names.COMMANDED_TRAJECTORY, names.PLC_INPUTS, names.SPEED_SCALING, names.CELL),
@@ -80,7 +80,10 @@ DRIVER = Rights(
 )
 RUNNER = Rights(
     publish=(names.SIGNALS, names.MACHINE_SIGNALS, names.PROGRAM_STATE),
-    subscribe=(names.SIGNALS, names.POWER_STATE, names.CONTROLLER_TIMERS, names.STOP_NUMBER),
+    subscribe=(
+        *(names.SIGNALS, names.POWER_STATE, names.CONTROLLER_TIMERS),
+        *(names.STOP_NUMBER, names.STOP_LATCHED),
+    ),
     request=(
         *(
             names.GET_PROGRAM,

@@ -15,12 +15,13 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import UInt64
+from std_msgs.msg import Bool, UInt64
 
 from ir_msgs.action import ExecuteTrajectory, RunProgram
 from ir_msgs.msg import PowerState, ProgramState, Status
 from ir_msgs.msg import Signal as SignalMsg
 from ir_msgs.srv import GetProgram, GetTrajectory, QueryModes, SetLoad, SetPlcInput
+from ir_msgs_py import status
 from ir_msgs_py.modes import Mode, TransitionTimes
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.plc import magic_packet
@@ -66,6 +67,8 @@ class FakeDriver(Node):
         self.timer = self.create_timer(0.01, self.read_meter)
         self.stops = self.create_publisher(UInt64, "~/stop_number", LATCHED)
         self.stops.publish(UInt64(data=0))
+        self.latched = self.create_publisher(Bool, "~/stop_latched", LATCHED)
+        self.latched.publish(Bool(data=False))
         self.create_service(SetPlcInput, "~/set_plc_input", self.set_plc_input)
         self.create_service(SetLoad, "~/set_load", self.set_load)
         self.create_service(QueryModes, "~/query_modes", self.query_modes)
@@ -370,6 +373,38 @@ def test_a_stop_while_a_program_waits_for_a_signal_ends_it_though_somebody_has_r
         cell.machines.publish(SignalMsg(name="door", value=True))
     assert cell.driver.log.count("drive") == 1
     assert "stop 1" in ended[0].status.message
+
+
+def test_a_stop_while_a_program_is_fetched_ends_it_though_somebody_has_recovered(
+    cell, wait_for, monkeypatch
+):
+    async def fetched(program_id):
+        cell.driver.stops.publish(UInt64(data=1))
+        await cell.runner._waiting.until(lambda: cell.runner._driver.stops == 1)
+        return status.Status.success(), (move(), move())
+
+    wait_for(lambda: cell.runner._driver.stops == 0)
+    monkeypatch.setattr(cell.runner._planner, "program", fetched)
+    result = cell.run(program_id="known")
+    assert result.status.code == StatusCode.INVALID_ROBOT_STATE
+    assert "stop 1 of the driver ended the program" in result.status.message
+    assert cell.driver.log == []
+
+
+def test_a_program_that_is_asked_for_while_a_stop_is_latched_does_not_wait_for_the_recovery(
+    cell, wait_for
+):
+    """Of the mode nothing can be seen: the controller is on its way to a rest and back."""
+    cell.driver.stops.publish(UInt64(data=3))
+    cell.driver.latched.publish(Bool(data=True))
+    wait_for(lambda: cell.runner._driver.stop_latched)
+    result = cell.run([pause(0.2), move()])
+    assert result.status.code == StatusCode.INVALID_ROBOT_STATE
+    assert "stop 3 of the driver ended the program: recover" in result.status.message
+    assert cell.driver.log == []
+    cell.driver.latched.publish(Bool(data=False))
+    wait_for(lambda: not cell.runner._driver.stop_latched)
+    assert cell.run([move()]).status.code == StatusCode.SUCCESS
 
 
 def test_a_pause_lasts_as_long_in_a_plant_that_lags(cell):

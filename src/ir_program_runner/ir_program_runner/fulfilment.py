@@ -39,6 +39,10 @@ class DriverPort(Protocol):
         """Number of the driver's last stop, None where it is not known."""
 
     @property
+    def stop_latched(self) -> bool | None:
+        """Whether that stop is latched, None where it is not known."""
+
+    @property
     def silent(self) -> bool:
         """Whether no reading of the meter has come for too long."""
 
@@ -94,14 +98,15 @@ class Ports:
 class Fulfilment:
     """One run of a program; `run` returns how it ended.
 
-    A stop of the driver ends the program, also one that was recovered from meanwhile: a person who
-    has recovered starts it again. What takes bits back is still sent.
+    after_stop: number of the driver's last stop when the program was asked for. A later one ends
+    the program, also one that was recovered from meanwhile, and so does one that is latched: a
+    person who has recovered starts it again. What takes bits back is still sent.
     """
 
-    def __init__(self, ports: Ports) -> None:
+    def __init__(self, ports: Ports, after_stop: int | None) -> None:
         self._ports = ports
         self._thrown = False
-        self._after_stop = ports.driver.stops
+        self._after_stop = after_stop
 
     async def run(self, program: Program) -> ProgramResult:
         """Drive the generator; a cancel is thrown into it once, at a request that takes time."""
@@ -127,8 +132,9 @@ class Fulfilment:
         return self._ports.canceled() and not self._thrown
 
     def _stopped(self) -> bool:
-        """Whether the driver has been stopped since the program began."""
-        return self._ports.driver.stops != self._after_stop
+        """Whether the driver is stopped, or has been since the program was asked for."""
+        driver = self._ports.driver
+        return bool(driver.stop_latched) or driver.stops != self._after_stop
 
     def _stop_status(self) -> Status:
         sentence = (

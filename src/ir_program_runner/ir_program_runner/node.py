@@ -190,11 +190,13 @@ class ProgramRunnerNode(Node):
                 goal, ProgramResult(Status(StatusCode.INVALID_ROBOT_STATE, sentence), 0), 0.0, 0.0
             )
         self._progress = progress = Progress(goal.request.program_id, (), self._driver.plant_time)
+        after_stop = self._driver.stops
         try:
             status, movements = await self._fetch(goal.request)
             # a driver or a /clock that has just been started gets the time to be discovered
             patience = self._settings.links.value.response_timeout
             await self._waiting.until(self._driver_is_known, patience)
+            after_stop = self._driver.stops if after_stop is None else after_stop
             progress.started = self._driver.plant_time
             self._jump = ""
             energy = self._driver.energy
@@ -204,20 +206,23 @@ class ProgramRunnerNode(Node):
                 timers = self._driver.timers
                 times = self._settings.transitions.value if timers is None else timers.transitions
                 program = Program(movements, self._settings.program.value, times)
-                result = await self._run_steps(goal, program)
+                result = await self._run_steps(goal, program, after_stop)
         finally:
             self._progress = None
         duration = self._driver.plant_time - progress.started
         return self._end(goal, result, duration, self._driver.energy - energy)
 
     def _driver_is_known(self) -> bool:
-        """Whether the meter and the number of the last stop have been heard, and time passes."""
-        return not self._driver.silent and self._driver.stops is not None and node_time(self) > 0.0
+        """Whether the meter and the last stop have been heard, and time passes."""
+        stop = (self._driver.stops, self._driver.stop_latched)
+        return not self._driver.silent and None not in stop and node_time(self) > 0.0
 
-    async def _run_steps(self, goal: ServerGoalHandle, program: Program) -> ProgramResult:
+    async def _run_steps(
+        self, goal: ServerGoalHandle, program: Program, after_stop: int | None
+    ) -> ProgramResult:
         feedback = self.create_timer(_FEEDBACK_PERIOD, lambda: self._publish_feedback(goal))
         try:
-            return await Fulfilment(self._ports(goal)).run(program)
+            return await Fulfilment(self._ports(goal), after_stop).run(program)
         finally:
             self.destroy_timer(feedback)
 

@@ -16,7 +16,7 @@ from action_msgs.msg import GoalStatus
 from rclpy.action import ActionClient
 from rclpy.node import Node
 from rclpy.task import Future
-from std_msgs.msg import UInt64
+from std_msgs.msg import Bool, UInt64
 
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import ControllerTimers as ControllerTimersMsg
@@ -97,8 +97,8 @@ class DriverClient:
     meter the driver counts as gone. cancel_timeout: to stop along the path. The meter is read when
     something is asked
     of it: a node that waits for nothing is not woken a hundred times a second.
-    timers: those of the controller, None before they came. stops: number of the last stop, None
-    before it came.
+    timers: those of the controller, None before they came. stops: number of the last stop, and
+    stop_latched: whether it is latched; None before they came.
     """
 
     def __init__(
@@ -133,7 +133,9 @@ class DriverClient:
             ControllerTimersMsg, f"{name}/controller_timers", self._read_timers, LATCHED
         )
         self.stops: int | None = None
+        self.stop_latched: bool | None = None
         node.create_subscription(UInt64, f"{name}/stop_number", self._read_stops, LATCHED)
+        node.create_subscription(Bool, f"{name}/stop_latched", self._read_latched, LATCHED)
 
     @property
     def mode(self) -> Mode | None:
@@ -289,6 +291,10 @@ class DriverClient:
 
     def _read_stops(self, message: UInt64) -> None:
         self.stops = int(message.data)
+        self._waiting.look()
+
+    def _read_latched(self, message: Bool) -> None:
+        self.stop_latched = bool(message.data)
         self._waiting.look()
 
     def _read_timers(self, message: ControllerTimersMsg) -> None:

@@ -43,7 +43,7 @@ class Frame:
     """What is published at the stamp of `joints`; None: nothing of it now.
 
     load: what is carried. inputs: the levels that count, when they have changed, whoever set them.
-    load_check: of a movement that has ended. stop_number: of the last stop.
+    load_check: of a movement that has ended. stop_number: of the last stop; stopped: it is latched.
     """
 
     joints: Joints
@@ -54,6 +54,7 @@ class Frame:
     inputs: PlcInputs | None = None
     load_check: LoadFinding | None = None
     stop_number: int = 0
+    stopped: bool = False
 
 
 class Frames:
@@ -91,7 +92,13 @@ class Frames:
                 outputs = present
         if joints.q is None:
             return Frame(
-                joints, simulation.load, power, None, outputs, stop_number=simulation.stop_number
+                joints,
+                simulation.load,
+                power,
+                None,
+                outputs,
+                stop_number=simulation.stop_number,
+                stopped=simulation.stopped,
             )
         if simulation.steps % CONTROLLER_PERIOD < self._steps:
             following = simulation.executor.following(backend.q, backend.qd)
@@ -101,7 +108,8 @@ class Frames:
         finding = simulation.load_checks.take()
         load = simulation.load
         number = simulation.stop_number
-        return Frame(joints, load, power, following, outputs, inputs, finding, number)
+        stopped = simulation.stopped
+        return Frame(joints, load, power, following, outputs, inputs, finding, number, stopped)
 
     def _power(self, stamp_ns: int) -> PowerState:
         simulation = self._simulation

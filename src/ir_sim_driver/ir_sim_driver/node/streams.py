@@ -11,7 +11,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
-from std_msgs.msg import UInt64
+from std_msgs.msg import Bool, UInt64
 
 from ir_msgs.msg import ControllerState, LoadCheck, PlcInputs, PlcOutputs, PowerState
 from ir_msgs_py import names
@@ -49,7 +49,9 @@ class Streams:
         self._states_of_controllers = ControllerStates(node, joint_names, _STREAM)
         self._load_checks = node.create_publisher(LoadCheck, own(names.LOAD_CHECK), LATCHED)
         self._stop_numbers = node.create_publisher(UInt64, own(names.STOP_NUMBER), LATCHED)
+        self._stop_latched = node.create_publisher(Bool, own(names.STOP_LATCHED), LATCHED)
         self._stop_number = -1
+        self._stopped: bool | None = None
         self._outputs = node.create_publisher(PlcOutputs, own(names.PLC_OUTPUTS), LATCHED)
         self._in_force = node.create_publisher(PlcInputs, own(names.PLC_INPUTS_IN_FORCE), LATCHED)
         self._joint_state = JointState(name=list(joint_names))
@@ -79,6 +81,9 @@ class Streams:
         if frame.stop_number != self._stop_number:
             self._stop_number = frame.stop_number
             self._stop_numbers.publish(UInt64(data=frame.stop_number))
+        if frame.stopped is not self._stopped:
+            self._stopped = frame.stopped
+            self._stop_latched.publish(Bool(data=frame.stopped))
         if frame.power is not None:
             self._power_states.publish(power_state_to_msg(frame.power))
         if frame.following is not None:
