@@ -20,7 +20,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallb
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64
+from std_msgs.msg import Bool, Float64, UInt64
 
 from ir_description import Cell, cell_from_yaml, cell_to_yaml
 from ir_kernels.chain import Chain
@@ -420,6 +420,7 @@ class MoveItNode(Node):
         plans = MutuallyExclusiveCallbackGroup()
         questions = MutuallyExclusiveCallbackGroup()
         self._executor = TrajectoryExecution(self._drive, answers.check_begin)
+        self._hear_stops(parameters.value.controller.rpartition("/")[0])
         apply = self._guarded(SERVICES["ApplyPlanningScene"], answers.apply_scene)
         self._monitor = SceneMonitor(
             self,
@@ -465,6 +466,17 @@ class MoveItNode(Node):
             self._offer_action("ExecuteTrajectory", self._execute),
         ]
 
+    def _hear_stops(self, driver: str) -> None:
+        """Of the driver whose controller drives; controllers of others tell of none."""
+        group = MutuallyExclusiveCallbackGroup()
+        for kind, name in ((UInt64, names.STOP_NUMBER), (Bool, names.STOP_LATCHED)):
+            topic = f"{driver}/{name.rpartition('/')[2]}"
+
+            def hear(message: Any, topic: str = topic) -> None:
+                self._executor.hear(topic, int(message.data))
+
+            self.create_subscription(kind, topic, hear, LATCHED, callback_group=group)
+
     def destroy_node(self) -> None:
         """Let go of the planner, then of the rest."""
         self._client.close()
@@ -475,13 +487,16 @@ class MoveItNode(Node):
     def _offer_action(self, kind: str, run: Callable[..., Status]) -> RecordedActionServer:
         """Serve an action of moveit_msgs: its goals are carried out one after the other."""
         action_type = getattr(import_module("moveit_msgs.action"), kind)
+        watches: dict[ServerGoalHandle, Canceled] = {}
 
         def execute(goal: ServerGoalHandle) -> Any:
+            stopped = watches.pop(goal)
+
             def feedback(state: str) -> None:
                 goal.publish_feedback(action_type.Feedback(state=state))
 
             def work(request: Any, result: Any) -> Status:
-                return run(request, result, lambda: bool(goal.is_cancel_requested), feedback)
+                return run(request, result, stopped, feedback)
 
             result = self._guarded(ACTIONS[kind], work)(goal.request, action_type.Result())
             feedback("IDLE")
@@ -489,6 +504,7 @@ class MoveItNode(Node):
             return result
 
         def refuse(goal: ServerGoalHandle) -> Any:
+            del watches[goal]
             result = action_type.Result()
             sentence = f"{_GOALS_WAITING} goals of {ACTIONS[kind]} wait already"
             put_error_code(result, Status(StatusCode.FAILURE, sentence, self.get_name()))
@@ -496,26 +512,31 @@ class MoveItNode(Node):
             return result
 
         goals = GoalQueue(execute, refuse, _GOALS_WAITING)
+
+        def accepted(goal: ServerGoalHandle) -> None:
+            watches[goal] = self._executor.watched(lambda: bool(goal.is_cancel_requested))
+            goals.accepted(goal)
+
         return RecordedActionServer(
             self,
             action_type,
             ACTIONS[kind],
             goals.execute,
-            handle_accepted_callback=goals.accepted,
+            handle_accepted_callback=accepted,
             cancel_callback=goals.cancel,
             callback_group=ReentrantCallbackGroup(),
             **ACTION_SERVICES,
         )
 
     def _execute(
-        self, goal: Any, result: Any, canceled: Callable[[], bool], feedback: Callable[[str], None]
+        self, goal: Any, result: Any, stopped: Canceled, feedback: Callable[[str], None]
     ) -> Status:
         """ExecuteTrajectory."""
         other = other_controller(goal.controller_names, self._settings.value.controller)
         if other is not None:
             return other
         feedback("MONITOR")
-        return self._executor.drive(goal.trajectory, self._executor.watched(canceled))
+        return self._executor.drive(goal.trajectory, stopped)
 
     def _drive(self, goal: Any, stopped: Callable[[], bool]) -> Any:
         return self._client.send_goal(self._settings.value.controller, goal, give_up=stopped)

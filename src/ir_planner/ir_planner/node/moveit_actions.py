@@ -39,6 +39,9 @@ class TrajectoryExecution:
 
     send: sends a goal and waits for its result; the second argument says when it is canceled.
     check_begin: refuses a trajectory that does not begin where the robot is.
+
+    A controller's goals can't name the driver's stop that their sender knows, so what is heard of
+    stops ends here all that was accepted before, whether it waits, is planned or is driven.
     """
 
     def __init__(
@@ -47,13 +50,20 @@ class TrajectoryExecution:
         self._send = send
         self._check_begin = check_begin
         self._stops = 0
+        self._heard: dict[str, int] = {}
 
     def stop(self) -> None:
-        """Stop what is driven now, along its path."""
+        """Stop what is driven now, along its path, and drive nothing that was accepted before."""
         self._stops += 1
 
+    def hear(self, topic: str, value: int) -> None:
+        """A topic of the driver that tells a stop or a recovery by another value."""
+        if self._heard.setdefault(topic, value) != value:
+            self._heard[topic] = value
+            self.stop()
+
     def watched(self, canceled: Canceled) -> Canceled:
-        """Whether a goal that begins now is canceled, or all are stopped."""
+        """Whether a goal that is accepted now is canceled, or all are stopped."""
         before = self._stops
         return lambda: canceled() or self._stops != before
 
@@ -72,7 +82,8 @@ class TrajectoryExecution:
             return Status(StatusCode.PREEMPTED, "stopped before it was driven")
         result = self._send(follow_goal()(trajectory=trajectory.joint_trajectory), stopped)
         if stopped():
-            return Status(StatusCode.PREEMPTED, "stopped along the path")
+            said = f": {result.error_string}" if result.error_string else ""
+            return Status(StatusCode.PREEMPTED, f"stopped along the path{said}")
         if result.error_code != _SUCCESSFUL:
             refused = int(result.error_code) in _REFUSED
             code = StatusCode.INVALID_MOTION_PLAN if refused else _CONTROL_FAILED
@@ -92,11 +103,10 @@ class MoveAction:
     check_start: Callable[[Any], None]
     executor: TrajectoryExecution
 
-    def run(self, goal: Any, result: Any, canceled: Canceled, feedback: Feedback) -> Status:
+    def run(self, goal: Any, result: Any, stopped: Canceled, feedback: Feedback) -> Status:
         """Plan, and where it is asked for, execute from where the robot is."""
         options = goal.planning_options
         _check_diff(options.planning_scene_diff)
-        stopped = self.executor.watched(canceled)
         request, response = self.new()
         request.motion_plan_request = goal.request
         if not options.plan_only:  # as in MoveIt: what is driven begins where the robot is
