@@ -233,23 +233,36 @@ def test_connections_that_drip_keep_no_button_out(cell: Cell, wait_for: Any) -> 
         connection.close()
 
 
-def test_a_stop_finds_a_place_among_waiting_requests_and_is_taken_first(wait_for: Any) -> None:
+def test_a_stop_finds_a_place_among_waiting_requests_and_refuses_what_was_asked_before(
+    wait_for: Any,
+) -> None:
+    """As release, conf_mess and drives_on of another browser: they would follow the press."""
     commands = Commands()
-    asked = [("ab", True)] * MOST_WAITING + [("emergency_stop", True)]
-    waiting = [threading.Thread(target=commands.press, args=each) for each in asked]
-    for thread in waiting:
+    answers: list[Answer] = []
+
+    def ask(name: str, value: bool) -> threading.Thread:
+        thread = threading.Thread(target=lambda: answers.append(commands.press(name, value)))
         thread.start()
-    wait_for(
-        lambda: commands._queue.qsize() + commands._stops.qsize() == len(asked),
-        what="all requests wait",
-    )
+        return thread
+
+    before = [ask("conf_mess", True) for _ in range(MOST_WAITING)]
+    wait_for(lambda: commands._queue.qsize() == MOST_WAITING, what="all requests wait")
+    stop = ask("emergency_stop", True)
+    for thread in before:
+        thread.join()
+    assert not any(answer.done for answer in answers)
+    assert "the emergency stop was pressed after it" in answers[0].sentence
+    after = ask("emergency_stop", False)
+    wait_for(lambda: commands._queue.qsize() == 1, what="the release waits")
     taken = list(commands.take())
     for command in taken:
         command.answer(True, "set")
-    for thread in waiting:
-        thread.join()
-    assert len(taken) == len(asked)
-    assert taken[0].name == "emergency_stop"
+    stop.join()
+    after.join()
+    assert [(each.name, each.value) for each in taken] == [
+        ("emergency_stop", True),
+        ("emergency_stop", False),
+    ]
 
 
 def test_a_port_that_is_taken_is_named_and_others_are_free(cell: Cell) -> None:

@@ -449,27 +449,39 @@ class Command:
 class Commands:
     """A short queue; `press` is called by browsers' threads, `take` by the node.
 
-    A press of the emergency stop always finds a place, and is taken first.
+    A press of the emergency stop always finds a place, and is taken first. What was asked for
+    before it and waits is refused: nothing of it may acknowledge the press or let go of the button.
     """
 
     def __init__(self) -> None:
         self._queue: queue.Queue[Command] = queue.Queue(MOST_WAITING)
         self._stops: queue.Queue[Command] = queue.Queue()
+        self._order = threading.Lock()  # of presses and of what waits when they come
 
     def press(self, name: str, value: bool) -> Answer:
         """Asks and waits; refuses what is no bit, and what comes faster than it is answered."""
         if name not in BITS:
             return Answer(False, f"{name[:60]!r} is no bit of the PLC: known are {', '.join(BITS)}")
         command = Command(name, value)
+        stop = name == _STOP and value
         try:
-            (self._stops if name == _STOP and value else self._queue).put_nowait(command)
+            with self._order:
+                for before in _waiting(self._queue) if stop else ():
+                    before.answer(False, "the emergency stop was pressed after it: ask again")
+                (self._stops if stop else self._queue).put_nowait(command)
         except queue.Full:
             return Answer(False, f"{MOST_WAITING} requests wait already")
         return command.wait()
 
     def take(self) -> Iterator[Command]:
         """What has been asked since the last time."""
-        for waiting in (self._stops, self._queue):
-            with suppress(queue.Empty):
-                while True:
-                    yield waiting.get_nowait()
+        with self._order:
+            taken = [*_waiting(self._stops), *_waiting(self._queue)]
+        yield from taken
+
+
+def _waiting(commands: queue.Queue[Command]) -> Iterator[Command]:
+    """Those that wait, taken out."""
+    with suppress(queue.Empty):
+        while True:
+            yield commands.get_nowait()
