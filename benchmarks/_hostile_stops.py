@@ -24,7 +24,7 @@ from _hostile_node import PRESS, RELEASE, Prey, prey
 from rclpy.action import ActionClient
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
-from std_msgs.msg import UInt64
+from std_msgs.msg import Bool, UInt64
 from trajectory_msgs.msg import JointTrajectory as TrajectoryMsg
 
 from ir_msgs.action import ExecuteTrajectory
@@ -45,6 +45,7 @@ PATIENCE = 30.0
 PLC = ("conf_mess", "drives_on", "drives_off", "move_enable", "ab", "end_rest", "aut")
 SHORT = {
     "joint_state_rate": 100,
+    "modbus_idle": "3600.0",  # the ways are drawn: on a busy machine none is silent for too long
     "transitions.bus_power_off_enter": "0.05",
     "transitions.bus_power_off_leave": "0.05",
     "transitions.bus_power_off_minimum_stay": "0.05",
@@ -72,8 +73,10 @@ class Cell:
         self.moved: set[int] = set()
         self.goals: list[Any] = []
         self.number = 0  # of the last stop
+        self.latched = False
         driver.client.subscribe(names.JOINT_STATES, JointState, self._hear)
         driver.client.subscribe(names.STOP_NUMBER, UInt64, self._count)
+        driver.client.subscribe(names.STOP_LATCHED, Bool, self._latch)
         self._actions = [
             client._executor.run(lambda client=client: self._action(client))
             for client in self.clients
@@ -107,6 +110,9 @@ class Cell:
 
     def _count(self, message: UInt64) -> None:
         self.number = message.data
+
+    def _latch(self, message: Bool) -> None:
+        self.latched = message.data
 
     def mark(self) -> None:
         """Note from here on which axes turn."""
@@ -191,7 +197,8 @@ class Cell:
             self.write("emergency_stop", level)
         elif way == "modbus":
             self.modbus.sendall(PRESS if level else RELEASE)
-            self.modbus.recv(64)
+            if not self.modbus.recv(64):
+                raise ConnectionError("the driver has cut its Modbus client")
         else:
             levels = PlcInputs(emergency_stop=level, move_enable=True)
             self.driver.client._executor.run(lambda: self._plc.publish(levels))
@@ -262,6 +269,7 @@ def episode(cell: Cell, generator: random.Random) -> None:
         _events(cell, generator, bits)
     time.sleep(generator.choice((0.0, 0.05, 0.2)))
     _stands(cell, "while a stop is latched")
+    _holds(cell.latched, "the driver says that no stop is latched")
     cell.rest()
     if generator.random() < 0.3:
         _events(cell, generator, ("move_enable",))
@@ -269,9 +277,11 @@ def episode(cell: Cell, generator: random.Random) -> None:
     time.sleep(0.025)
     _stands(cell, "after the release")
     _holds(cell.run(), f"no recovery: mode {cell.driver.modes[-1:]}")
-    cell.frames(generator.choice((5, 10, 40)))
-    _stands(cell, "after the recovery, by what came before")
+    # when all have a result nothing is left that could move; the topic gives none
     _holds(cell.ended() is not None, "a goal has no result")
+    cell.frames(generator.choice((2, 5, 20)))
+    _stands(cell, "after the recovery, by what came before")
+    _holds(cell.wait(lambda: not cell.latched), "the driver says that the stop is still latched")
     if generator.random() < 0.1:
         _moves(cell, generator)
 
