@@ -90,3 +90,29 @@ def test_what_begins_beside_the_movement_or_behind_is_not_joined(make, start, ce
     with pytest.raises(TrajectoryRefusedError):
         start(simulation, following)
     assert simulation.executor.active
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_stop_at_any_moment_ends_the_movement_and_what_joins_it(make, start, cell, seed):
+    """Nothing moves between the stop and the recovery nor for longer than both would take after
+    it.
+    """
+    driven, following, at = drawn(cell, seed)
+    draw = np.random.default_rng(seed)
+    simulation = make()
+    start(simulation, driven)
+    simulation.run(at - 0.5)
+    start(simulation, following)
+    simulation.run(draw.uniform(0.0, 2.0))  # before they meet, or behind
+    assert simulation.executor.active
+    simulation.plc.set_bit("emergency_stop", True)
+    simulation.run(draw.uniform(0.5, 1.0))
+    stood = simulation.backend.q.copy()
+    assert [outcome.code for outcome in simulation.take_outcomes()] == [ErrorCode.INVALID_GOAL] * 2
+    simulation.plc.set_bit("emergency_stop", False)
+    simulation.run(draw.uniform(0.05, 1.0))
+    assert np.array_equal(simulation.backend.q, stood)
+    simulation.recover()
+    simulation.run(driven.duration + following.duration)
+    assert not simulation.executor.active
+    assert np.abs(simulation.backend.q - stood).max() < 1e-3  # motors take up what the arm sagged
