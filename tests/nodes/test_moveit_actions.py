@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ir_msgs_py.status import StatusCode
+from ir_msgs_py.status import Status, StatusCode
 from ir_planner.node import moveit_actions
 from ir_planner.node.moveit_actions import MoveAction, TrajectoryExecution
 
@@ -59,7 +59,7 @@ def test_no_goal_that_was_accepted_before_a_stop_or_its_recovery_is_driven(event
 
     executor = TrajectoryExecution(send, lambda trajectory: None)
     move = MoveAction(
-        lambda request, response, stopped: moveit_actions.Status.success(),
+        lambda request, response, stopped: Status.success(),
         lambda: (
             Of(),
             Of(
