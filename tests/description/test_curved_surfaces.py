@@ -141,6 +141,20 @@ def test_a_triangle_without_area_is_as_far_as_its_longest_edge() -> None:
         np.testing.assert_allclose(found, distance, rtol=1e-9)
 
 
+def test_a_point_is_as_far_from_a_triangle_as_from_its_nearest_point() -> None:
+    """Of 5000 triangles, more than are measured at once: against a grid of points of each."""
+    rng = np.random.default_rng(3)
+    triangles = rng.normal(size=(5000, 3, 3))
+    points = rng.normal(size=(5000, 3))
+    found = point_triangle(points, triangles)
+    shares = np.array([(i, j, 16 - i - j) for i in range(17) for j in range(17 - i)]) / 16.0
+    grid = np.einsum("gk,tkx->tgx", shares, triangles)
+    nearest = np.linalg.norm(grid - points[:, None], axis=2).min(axis=1)
+    longest = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
+    assert (found <= nearest + 1e-12).all()
+    assert (found >= nearest - longest / 16.0).all()
+
+
 def test_the_pieces_of_a_cell_contain_the_curved_solid(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -38,6 +38,7 @@ _ROUNDS = 24
 _SAMPLES = 60_000  # of the mesh's surface: where its nearest triangles are looked for
 _NEIGHBOURS = 4
 _CHUNK = 2_000_000
+_BLOCK = 4096  # points whose distances are found at once
 
 
 def protrusion(pieces: Sequence[FloatArray], triangles: FloatArray) -> float:
@@ -134,33 +135,51 @@ def _longest(triangles: FloatArray) -> FloatArray:
 
 def point_triangle(points: FloatArray, triangles: FloatArray) -> FloatArray:
     """Distance (N,) of each point (N, 3) from its triangle (N, 3, 3), also of one without area."""
-    a = triangles[:, 0]
-    b = triangles[:, 1]
-    c = triangles[:, 2]
-    found = np.min([_point_segment(points, *ends) for ends in ((a, b), (b, c), (c, a))], axis=0)
-    normal = np.cross(b - a, c - a)
-    height = np.einsum("ni,ni->n", points - a, normal)
-    square = np.einsum("ni,ni->n", normal, normal)
-    flat = square == 0.0
-    square = np.where(flat, 1.0, square)
-    foot = points - (height / square)[:, None] * normal
-    sides = [
-        np.einsum("ni,ni->n", np.cross(q - p, foot - p), normal) >= 0.0
-        for p, q in ((a, b), (b, c), (c, a))
-    ]
-    above = np.all(sides, axis=0) & ~flat
-    nearest: FloatArray = np.where(above, np.abs(height) / np.sqrt(square), found)
+    found = np.empty(len(points))
+    for k in range(0, len(points), _BLOCK):
+        found[k : k + _BLOCK] = _from_triangles(points[k : k + _BLOCK], triangles[k : k + _BLOCK])
+    return found
+
+
+def _from_triangles(points: FloatArray, triangles: FloatArray) -> FloatArray:
+    """The same of few enough that what is in between stays in the processor's cache."""
+    a, b, c = np.ascontiguousarray(triangles.reshape(-1, 9).T).reshape(3, 3, -1)
+    at = np.ascontiguousarray(points.T)
+    ends = ((a, b), (b, c), (c, a))
+    sides = [(q - p, at - p) for p, q in ends]
+    edge = np.min([_beside(*side) for side in sides], axis=0)
+    normal = _cross(b - a, c - a)
+    square = _dot(normal, normal)
+    above = square > 0.0
+    for side in sides:
+        above &= _dot(_cross(*side), normal) >= 0.0
+    height = _dot(at - a, normal)
+    nearest: FloatArray = np.sqrt(
+        np.where(above, height * height / np.where(above, square, 1.0), edge)
+    )
     return nearest
 
 
-def _point_segment(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    along = end - start
-    square = np.einsum("ni,ni->n", along, along)
-    share = np.einsum("ni,ni->n", points - start, along) / np.where(square == 0.0, 1.0, square)
-    distance: FloatArray = np.linalg.norm(
-        points - (start + np.clip(share, 0.0, 1.0)[:, None] * along), axis=1
+def _beside(along: FloatArray, at: FloatArray) -> FloatArray:
+    """Square of the distance (N,) of points at (3, N) from edges (3, N) that begin at 0."""
+    square = _dot(along, along)
+    share = _dot(along, at) / np.where(square == 0.0, 1.0, square)
+    apart = at - np.clip(share, 0.0, 1.0) * along
+    return _dot(apart, apart)
+
+
+def _dot(first: FloatArray, second: FloatArray) -> FloatArray:
+    return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
+
+
+def _cross(first: FloatArray, second: FloatArray) -> FloatArray:
+    return np.stack(
+        [
+            first[1] * second[2] - first[2] * second[1],
+            first[2] * second[0] - first[0] * second[2],
+            first[0] * second[1] - first[1] * second[0],
+        ]
     )
-    return distance
 
 
 # CoACD in a process of its own: it is native code that hostile meshes can crash, and it takes its
