@@ -73,11 +73,15 @@ class Statement:
     def short_by(self, seeds: int) -> float:
         """How many times the sample each of so many seeds would need alone for an interval that
         ends at the
-        bound: it narrows with the root of the sample. Inf where the figure is the bound, nan
-        without a width.
+        bound: it narrows with the root of the sample, Wilson's of shares that never varied, z^2 /
+        (N + z^2), with the sample. Inf where the figure is the bound, nan without a width.
         """
         gap = abs(self.value - self.bound)
         width = self.value - self.low if self.value > self.bound else self.high - self.value
+        share = self.unit == "%" and self.value in (0.0, 100.0)
+        difference = self.unit == "points" and self.value == 0.0 and self.low == -self.high
+        if (share or difference) and min(gap, width) > 0.0:
+            return seeds * (100.0 / gap - 1.0) / (100.0 / width - 1.0)
         return seeds * (width / gap) ** 2 if gap > 0.0 else math.inf
 
 

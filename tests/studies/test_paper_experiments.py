@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import _paper_blocked
@@ -14,7 +15,7 @@ import numpy as np
 import paper
 import pytest
 from _paper_peers import Clock
-from _paper_result import FAILS, Statement
+from _paper_result import FAILS, HOLDS, OPEN, Statement
 from _paper_stations import places
 
 from ir_planner.configurations.ccd_search import Descent
@@ -39,6 +40,35 @@ def test_a_difference_that_never_varies_is_no_certainty() -> None:
     many = Statement("", "", *statistics.mean_difference([0.0] * 200), 200, "", "points", 2.0)
     assert many.alone == FAILS
     assert all(map(math.isnan, statistics.mean_difference([])))
+
+
+def all_failures(count: int) -> Statement:
+    found = statistics.percent(statistics.share([0.0] * count))
+    return Statement("", "", *found, count, "", "%", 5.0, at_least=False)
+
+
+def all_successes(count: int) -> Statement:
+    found = statistics.percent(statistics.share([1.0] * count))
+    return Statement("", "", *found, count, "", "%", 95.0)
+
+
+def all_the_same(count: int) -> Statement:
+    found = statistics.mean_difference([0.0] * count)
+    return Statement("", "", *found, count, "", "points", 2.0)
+
+
+@pytest.mark.parametrize(
+    ("alone", "verdict"),
+    [(all_failures, HOLDS), (all_successes, HOLDS), (all_the_same, FAILS)],
+)
+@pytest.mark.parametrize("groups", [6, 30])
+def test_what_never_varies_is_decided_by_the_sample_that_its_note_says(
+    alone: Callable[[int], Statement], verdict: str, groups: int
+) -> None:
+    enough = alone(groups).short_by(1) * groups
+    assert alone(groups).alone == OPEN
+    assert alone(int(0.99 * enough)).alone == OPEN
+    assert alone(int(enough) + 1).alone == verdict
 
 
 def test_every_seed_of_the_withdrawal_can_decide_a_difference_that_never_varies() -> None:
