@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ir_kernels.ccd import CcdSettings, ccd
 from ir_planner.configurations.ccd_search import (
     GAIN,
     NONE,
@@ -335,3 +336,51 @@ def test_a_start_is_given_up_after_three_sweeps_in_a_row_without_gain(
             assert (left[-3:] > 0.98).all()
             given_up += 1
     assert given_up > 5
+
+
+@pytest.mark.parametrize(("every", "sweeps"), [(2, 3), (3, 5)])
+def test_newtons_steps_are_tried_after_every_so_many_sweeps_and_after_the_last(
+    every: int, sweeps: int, scene_of: Callable[[str], PlanningScene]
+) -> None:
+    """Judge: Newton's steps from what each start has reached by then."""
+    scene = scene_of("demo")
+    robot = scene.cell.robot
+    rng = np.random.default_rng(1)
+    starts = random_starts(robot.position_min, robot.position_max, 60, "uniform", rng)
+    pose = np.array(scene.station("lathe_work").pose)
+    threshold = scene.thresholds(0.02, "lathe_work")
+    asked = InteractionSettings(sweeps=sweeps, finish_every=every, set_back=NONE)
+    newton = CcdSettings(0.5, asked.xi, 0, asked.newton_steps)
+    found = descend(pose, starts, scene, threshold, asked, Work(10_000, np.inf, lambda: 0.0))
+    tried = sorted({*range(every, sweeps, every), sweeps})
+    ended = set()
+    for track, outcome in zip(found.tracks, found.outcome, strict=True):
+        there = ccd(scene.chain, pose, track, robot.position_min, robot.position_max, newton)
+        arrives = [k for k in tried if k < len(track) and there.psi[k] < asked.xi]
+        if outcome == "not converged":
+            assert not arrives
+            assert len(track) == sweeps + 1
+        else:
+            assert len(track) == arrives[0] + 2  # the start, its sweeps, the pose
+            ended.add(arrives[0])
+    assert {every, sweeps} <= ended
+
+
+def test_what_is_accepted_keeps_its_distance(scene_of: Callable[[str], PlanningScene]) -> None:
+    """Judge: the distances of all pairs; the margin is moved by 50 um across that of a found
+    one.
+    """
+    scene = scene_of("deep_box")
+    pose = np.array(scene.station("bin").pose)
+    asked = InteractionSettings(set_back=NONE)  # the descents don't depend on the margin
+
+    def search(threshold: FloatArray) -> FloatArray:
+        work = Work(10_000, np.inf, lambda: 0.0)
+        return searched_configurations(pose, scene, threshold, HOME, 32, 1, asked, work).q
+
+    threshold = scene.thresholds(0.02, "bin")
+    found = search(threshold)
+    left = (scene.collision.distances(found) - threshold).min(axis=1)
+    least = threshold + left.min()
+    assert len(search(least - 5e-5)) == len(found)
+    assert len(search(least + 5e-5)) < len(found)
