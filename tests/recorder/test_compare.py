@@ -22,6 +22,7 @@ from ir_recorder import Analysis, analyse, findings
 from ir_recorder.analysis.production import production_of
 from ir_recorder.report.charts import COLOURS, MARKS, Point, front_chart, front_section, pareto
 from ir_recorder.report.compare import _WITH_PAUSES, comparison_html
+from ir_recorder.report.costs import Costs, yearly_money
 from ir_recorder.report.headline import source
 from ir_recorder.report.number_text import joules, kilowatt_hours, seconds
 from ir_recorder.report.page import asset
@@ -54,6 +55,17 @@ def test_a_tenth_more_is_ten_percent(analysis: Analysis, other: Analysis) -> Non
     assert "demo is what the others are held against" in page
     assert "different plants" in page
     assert "different plants" not in page_of(analysis, analysis)
+
+
+def test_the_heading_names_the_program_that_costs_least(
+    analysis: Analysis, other: Analysis
+) -> None:
+    years = [Costs().energy_of_year(production_of(each)) for each in (analysis, other)]
+    less = yearly_money(Costs().money(years[1].value - years[0].value), "EUR")
+    assert f"<h2>demo: {less} less a year than other</h2>" in page_of(other, analysis)
+    assert "<h2>demo costs least: " in page_of(analysis, other)
+    alike = page_of(analysis, analyse(replace(analysis.recording, path=Path("again.mcap"))))
+    assert "<h2>No program is shown to cost less than demo</h2>" in alike
 
 
 def test_power_on_the_common_grid_keeps_the_peaks_of_the_meter(

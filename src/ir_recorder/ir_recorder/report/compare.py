@@ -89,6 +89,7 @@ def comparison_html(compared: Sequence[Compared], costs: Costs | None = None) ->
             else f"{names[0]} is what the others are held against"
         ),
         "problems": _problems(analyses, names),
+        "message": text(_message(analyses, names, costs or Costs())),
         "paid": _paid(compared, names, costs or Costs()),
         "supply": "" if any(map(drives_only, analyses)) else ", at the mains",
         "assumed": assumed_section(costs or Costs()),
@@ -135,6 +136,25 @@ def _problems(analyses: Sequence[Analysis], names: Sequence[str]) -> str:
     return (
         f'<div class="problems calm"><b>Notes</b><ul>{"".join(items)}</ul></div>' if items else ""
     )
+
+
+def _message(analyses: Sequence[Analysis], names: Sequence[str], costs: Costs) -> str:
+    """Which program costs least, and how much less than the first one, where their intervals lie
+    apart.
+    """
+    cycles = [production_of(analysis) for analysis in analyses]
+    known = [cycle for cycle in cycles if cycle is not None]
+    if _apart(analyses) or len(known) < len(cycles) or len({c.drives_only for c in known}) > 1:
+        return "Energy costs of a year"
+    years = [costs.energy_of_year(cycle).of(costs.money) for cycle in known]
+    least = min(range(len(years)), key=lambda k: years[k].value)
+    price = yearly_money(years[least].value, costs.currency)
+    if least == 0 and all(year.low > years[0].high for year in years[1:]):
+        return f"{names[0]} costs least: {price} a year"
+    less = years[0].value - years[least].value
+    if years[least].high < years[0].low:
+        return f"{names[least]}: {yearly_money(less, costs.currency)} less a year than {names[0]}"
+    return f"No program is shown to cost less than {names[0]}"
 
 
 def _paid(compared: Sequence[Compared], names: Sequence[str], costs: Costs) -> str:
