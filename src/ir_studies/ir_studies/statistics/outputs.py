@@ -261,9 +261,10 @@ def _in_words(found: Findings) -> Iterator[str]:
         )
     for each in found.agreements:
         if math.isfinite(each.mean.value):
+            within = f" ({_interval(each.mean)})" if math.isfinite(each.mean.low) else ""
             yield (
-                f"Energy {each.name}: {percent(each.mean.value)} % in the mean "
-                f"({_interval(each.mean)}), of {each.pairs} pairs."
+                f"Energy {each.name}: {percent(each.mean.value)} % in the mean{within}, of "
+                f"{each.pairs} pairs."
             )
 
 
