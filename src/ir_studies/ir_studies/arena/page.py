@@ -254,8 +254,8 @@ def _solved_bars(found: Sequence[Figures]) -> str:
             (Piece("planned" if one.planner == PORTFOLIO else "today", "solved", one.success),),
             f"{one.solved} of {one.count}",
             (
-                f"first answer {milliseconds(one.first)}, J {percent(one.cost_ratio - 1.0)} above "
-                "the best",
+                f"first answer {milliseconds(one.first)}",
+                f"J {percent(one.cost_ratio - 1.0)} above the best",
             ),
         )
         for one in sorted(found, key=lambda one: (-one.solved, one.cost_ratio))
