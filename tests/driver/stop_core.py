@@ -38,10 +38,14 @@ class Silent:
 
 
 class Core:
-    """The core with a robot; moving: stop number of the goal that moves it, None: it stands."""
+    """The core with a robot; moving: stop number of the goal that moves it, None: it stands.
 
-    def __init__(self) -> None:
-        self.plc = Plc(SETTINGS.plc, Silent())  # type: ignore[arg-type]
+    before: number before the first stop.
+    """
+
+    def __init__(self, before: int = 0) -> None:
+        silent: Any = Silent()
+        self.plc = Plc(SETTINGS.plc, silent, before_first_stop=before)
         self.control = ModeControl(SETTINGS, self.plc, lambda mode: 100.0, {})
         self.queue = TrajectoryQueue()
         self.moving: int | None = None

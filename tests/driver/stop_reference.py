@@ -47,11 +47,11 @@ class Signal:
 
 
 class Reference:
-    """state: a row of the table. number: of the last stop."""
+    """state: a row of the table. number: of the last stop; before: the one before the first."""
 
-    def __init__(self) -> None:
+    def __init__(self, before: int = 0) -> None:
         self.state = "run"
-        self.number = 0
+        self.number = before
         self.now = 0
         self.messages = 0
         self.barrier = 0

@@ -13,7 +13,7 @@ import pytest
 from ir_msgs_py.modes import Mode
 from ir_sim_driver.controller import SupervisionSettings
 from ir_sim_driver.controller.outputs import report
-from ir_sim_driver.errors import BackendError, RequestRefusedError
+from ir_sim_driver.errors import BackendError, RequestRefusedError, TrajectoryRefusedError
 from ir_sim_driver.motion.goal import ErrorCode
 
 
@@ -236,3 +236,27 @@ def test_recovering_from_nothing_is_harmless(make):
     assert "nothing to recover from" in simulation.recover()
     simulation.run(0.1)
     assert simulation.modes.mode is Mode.STAND_ON_MOTORS
+
+
+def test_a_goal_that_follows_another_driver_process_is_refused(make, plan, start, home):
+    known = make(before_first_stop=1_795_973_304_123_000_000)
+    anew = make(before_first_stop=1_795_973_304_124_000_000)
+    there = home + 0.1
+    with pytest.raises(TrajectoryRefusedError, match="was started after the one that the sender"):
+        start(anew, plan(1.0, home, there), after_stop=known.stop_number)
+    assert not anew.executor.active
+    start(anew, plan(1.0, home, there), after_stop=anew.stop_number)
+
+
+def test_a_goal_that_does_not_know_the_last_stop_is_refused_with_the_count_of_both(
+    make, plan, start, home
+):
+    simulation = make(before_first_stop=1_795_973_304_123_000_000)
+    known = simulation.stop_number
+    simulation.plc.set_bit("emergency_stop", True)
+    simulation.plc.set_bit("emergency_stop", False)
+    simulation.run(0.1)
+    simulation.recover()
+    simulation.run(1.0)
+    with pytest.raises(TrajectoryRefusedError, match="stop 1 came after stop 0"):
+        start(simulation, plan(1.0, home, home + 0.1), after_stop=known)

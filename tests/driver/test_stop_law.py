@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any
 import pytest
 
 from ir_msgs_py.modes import READY, Mode
+from ir_msgs_py.stops import before_first_stop
 from ir_sim_driver.emergency_stop import StopState
 
 sys.path.insert(0, str(Path(__file__).parent))  # benchmarks/hostile.py reads this file too
@@ -24,9 +26,9 @@ BITS = ("emergency_stop", "conf_mess", "drives_on", "drives_off", "ab", "hib")
 class Pair:
     """The core and the reference, told the same."""
 
-    def __init__(self) -> None:
-        self.core = Core()
-        self.reference = Reference()
+    def __init__(self, before: int = 0) -> None:
+        self.core = Core(before)
+        self.reference = Reference(before)
 
     def clone(self) -> Pair:
         new = same(self)
@@ -120,6 +122,36 @@ def drawn(steps: int, seed: int) -> str:
 @pytest.mark.parametrize("seed", range(20))
 def test_random_sequences_of_a_plc_are_what_the_table_says(seed: int) -> None:
     assert drawn(200, seed) == ""
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_follows_another_driver_process_moves_nothing(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Driver processes one after the other, each started a millisecond or more after the last, with
+    any number of stops; programs of all of them go on whenever they like, each with the number of
+    the stop that it knows.
+    """
+    generator = random.Random(seed)
+    now_ms = 1_795_973_304_123
+    programs: list[tuple[int, int]] = []
+    for process in range(8):
+        now_ms += generator.choice((1, 2, 1_000, 86_400_000))
+        now_ns = now_ms * 1_000_000
+        monkeypatch.setattr(time, "time_ns", lambda now_ns=now_ns: now_ns)
+        pair = Pair(before_first_stop())
+        for _ in range(20):
+            for level in (True, False):
+                pair.write({"emergency_stop": generator.random() < 0.5 and level})
+                pair.settle()
+            pair.recover()
+            assert pair.difference() == ""
+            programs.append((process, pair.core.plc.stop.number))
+            for known, number in programs:
+                moves = pair.core.start(number)
+                last = number == pair.reference.number
+                may = known == process and last and not pair.core.control.refusal()
+                assert moves == may, (known, process, number)
 
 
 # -- all interleavings

@@ -13,7 +13,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
+from std_msgs.msg import String, UInt64
 
 from ir_description import load_cell, load_power_data
 from ir_msgs.action import ExecuteTrajectory
@@ -25,6 +25,7 @@ from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.status import StatusCode
+from ir_msgs_py.stops import same_driver
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.controller.mains import Mains
 from ir_sim_driver.node import SimDriver, streams
@@ -109,6 +110,18 @@ def test_power_state_is_the_derivative_of_its_energy(make_driver, listen, wait_f
     energy = np.array([msg.energy for msg in received])
     power = np.array([msg.power for msg in received])
     assert np.allclose(np.diff(energy), power[1:] * np.diff(stamps) * 1e-9, rtol=1e-6)
+
+
+def test_each_driver_has_stop_numbers_of_its_own(make_driver, listen, wait_for, ros_executor):
+    """So that a goal which follows one that has died is refused by the next."""
+    numbers = listen(names.STOP_NUMBER, UInt64, latched=True)
+    for count in (1, 2):
+        driver = make_driver()
+        wait_for(lambda count=count: len(numbers) == count)
+        ros_executor.run(driver.destroy_node)
+    first, second = (message.data for message in numbers)
+    assert first < second
+    assert not same_driver(first, second)
 
 
 def test_joint_states_are_published_before_the_meter_is_read(make_driver, wait_for, monkeypatch):

@@ -429,6 +429,15 @@ def test_a_stop_in_a_pause_on_brakes_ends_the_program_and_asks_for_no_motors(cel
     assert "stop 1" in ended[0].status.message
 
 
+def test_a_program_ends_when_its_driver_was_started_anew(cell, wait_for):
+    with cell.running([move(), pause(60.0), move()], wait_for) as ended:
+        wait_for(lambda: "1 started" in cell.events())
+        cell.driver.stops.publish(UInt64(data=1_795_973_304_123_000_000))
+        wait_for(lambda: "1 failed" in cell.events())
+    assert cell.driver.log.count("drive") == 1
+    assert "the driver was started anew" in ended[0].status.message
+
+
 def test_the_soft_plc_answers_for_a_machine(ros_context, ros_executor, wait_for):
     machines = Machines([Described("door_open", follows="open_door", delay=0.05)])
     cell = Cell(ros_context, ros_executor, machines)

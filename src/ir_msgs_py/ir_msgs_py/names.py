@@ -117,7 +117,9 @@ LOAD_SEPARATOR: Final = "+"
 NO_LOAD: Final = "none"
 
 STOPS_STATE: Final = "driver.stops"
-"""Of a goal's `states`: "driver.stops=2" relies on no stop after the second."""
+"""Of a goal's `states`: with the number of the driver's last stop it relies on no later one, and on
+no driver that was started anew.
+"""
 END_REST: Final = "end_rest"
 """Name in SetPlcInput of a program's request to leave the rest that drives_off began."""
 TAKE_BACK: Final = "end_"

@@ -12,6 +12,7 @@ from ir_msgs_py.modes import Mode, PowerMode
 from ir_msgs_py.names import TAKE_BACK
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.status import Status, StatusCode
+from ir_msgs_py.stops import same_driver, stop_count
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_program_runner import requests as ask
 from ir_program_runner.errors import CanceledError
@@ -137,10 +138,17 @@ class Fulfilment:
         return bool(driver.stop_latched) or driver.stops != self._after_stop
 
     def _stop_status(self) -> Status:
+        number = self._ports.driver.stops or 0
+        known = number if self._after_stop is None else self._after_stop
         sentence = (
-            f"stop {self._ports.driver.stops} of the driver ended the program: recover, then start "
-            "it again"
+            f"stop {stop_count(number)} of the driver ended the program: recover, then start it "
+            "again"
         )
+        if not same_driver(number, known):
+            sentence = (
+                "the driver was started anew, which ended the program: see to the robot, then "
+                "start it again"
+            )
         return Status(StatusCode.INVALID_ROBOT_STATE, sentence)
 
     async def _outcome(self, request: ask.Request) -> ask.RequestOutcome:

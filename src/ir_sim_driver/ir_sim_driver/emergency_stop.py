@@ -13,6 +13,7 @@ import time
 from enum import Enum
 
 from ir_msgs_py.status import StatusCode
+from ir_msgs_py.stops import stop_count
 from ir_sim_driver.errors import RequestRefusedError
 
 
@@ -43,15 +44,15 @@ _PUSHED = (StopState.PRESSED, StopState.PRESSED_FAULT)
 
 
 class StopMachine:
-    """state: where it is. number: of the last stop, 0 before the first.
+    """state: where it is. number: of the last stop, at first `before`: the number before the first.
 
     at_ns: time of that stop on the host's monotonic clock. Orders grow with every message that is
     written.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, before: int = 0) -> None:
         self.state = StopState.RUN
-        self.number = 0
+        self.number = before
         self.at_ns = 0
         self._since = 0
         self._acknowledged = 0
@@ -79,7 +80,8 @@ class StopMachine:
         """Raise RequestRefusedError where a request came before the last stop, and waited."""
         if self.came_later(came_ns):
             raise RequestRefusedError(
-                StatusCode.INVALID_ROBOT_STATE, f"{what} came before stop {self.number}: ask again"
+                StatusCode.INVALID_ROBOT_STATE,
+                f"{what} came before stop {stop_count(self.number)}: ask again",
             )
 
     def press(self, order: int) -> None:

@@ -273,7 +273,7 @@ class Driver:
 
     @property
     def stop_number(self) -> int:
-        """Number of the last stop, 0 before the first."""
+        """Number of the last stop (`ir_msgs_py.stops`)."""
         return self._simulation.stop_number
 
     @property

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
+from ir_msgs_py.stops import stop_count
 from ir_sim_driver.controller.goal_checks import VettedGoal
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.errors import TrajectoryRefusedError
@@ -126,7 +127,9 @@ class TrajectoryQueue:
 
 def ended_by_stop(number: int) -> str:
     """Sentence of a goal that was sent before a stop."""
-    return f"stop {number} came after the trajectory was sent: recover, then send it again"
+    return (
+        f"stop {stop_count(number)} came after the trajectory was sent: recover, then send it again"
+    )
 
 
 class Goals:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from ir_msgs_py.modes import DRIVES_ON, OFF_THE_NETWORK, READY, RESTS, ROW, Mode, PowerMode
 from ir_msgs_py.plc import OperatingMode, PlcOutputs
 from ir_msgs_py.status import StatusCode
+from ir_msgs_py.stops import stop_count
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.plc import OFF_BIT, Plc
@@ -294,9 +295,10 @@ class ModeControl:
         has given drives_off.
         """
         if self._plc.stop.stopped:
+            number = stop_count(self._plc.stop.number)
             raise RequestRefusedError(
                 StatusCode.INVALID_ROBOT_STATE,
-                f"stop {self._plc.stop.number} is latched: a person has to recover first",
+                f"stop {number} is latched: a person has to recover first",
             )
         other = self._plc.keeps_off(giver)
         if other:

@@ -66,7 +66,9 @@ class ControllerSettings:
 
 @dataclass(frozen=True)
 class SimulationSettings:
-    """All stages of the simulation; dt [s]: step of plant and controller."""
+    """All stages of the simulation; dt [s]: step of plant and controller. before_first_stop: number
+    of stops before the first one (`ir_msgs_py.stops`).
+    """
 
     dt: float = DT
     controller: ControllerSettings = field(default_factory=ControllerSettings)
@@ -77,3 +79,4 @@ class SimulationSettings:
     idle: IdleTimes = field(default_factory=IdleTimes)
     plc: PlcSettings = field(default_factory=PlcSettings)
     load_check: LoadCheckSettings = field(default_factory=LoadCheckSettings)
+    before_first_stop: int = 0

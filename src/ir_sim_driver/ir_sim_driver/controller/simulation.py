@@ -14,6 +14,7 @@ from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.modes import OFF_THE_NETWORK, READY, Mode
 from ir_msgs_py.plc import OperatingMode, PlcOutputs
 from ir_msgs_py.status import StatusCode
+from ir_msgs_py.stops import same_driver, stop_count
 from ir_sim_driver.controller.contacts import CellWatch
 from ir_sim_driver.controller.goal_checks import VettedGoal, vet
 from ir_sim_driver.controller.mains import Mains
@@ -182,7 +183,12 @@ class Simulation:
         self.mains = Mains(
             self.plant, data, backend, settings.dt, settings.controller.regeneration_mode
         )
-        self.plc = Plc(settings.plc, self.notices, settings.controller.mode_switch)
+        self.plc = Plc(
+            settings.plc,
+            self.notices,
+            settings.controller.mode_switch,
+            settings.before_first_stop,
+        )
         pe_ids = {Mode[mode.name]: mode.pe_mode_id for mode in data.modes}
         charging = charging_of(data.dc_link)
         self.control = ModeControl(settings, self.plc, self.standing_power, pe_ids, charging)
@@ -228,7 +234,9 @@ class Simulation:
 
     @property
     def stop_number(self) -> int:
-        """Number of the last stop, 0 before the first; nothing of before it moves any more."""
+        """Number of the last stop; nothing of before it, or of another driver process, moves any
+        more.
+        """
         return self.plc.stop.number
 
     @property
@@ -254,11 +262,8 @@ class Simulation:
         """
         goal = vetted.goal
         refusal = self.refusal() or self.surroundings.refusal(goal, self.load)
-        if not refusal and goal.after_stop not in (None, self.stop_number):
-            refusal = (
-                f"stop {self.stop_number} came after stop {goal.after_stop}, which the sender "
-                "knows: send it again if it still holds"
-            )
+        if not refusal and goal.after_stop is not None and goal.after_stop != self.stop_number:
+            refusal = _stale(goal.after_stop, self.stop_number)
         if refusal := refusal or self.cell_watch.refusal(goal, vetted.keep.scene):
             raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, refusal)
         now = self.executor.motion()
@@ -490,3 +495,13 @@ def make_simulation(
         settings = replace(settings, idle=timers)
     robot = make_backend(backend, cell, settings.dt, settings.control, plant)
     return Simulation(cell, data, robot, what, settings, plant)
+
+
+def _stale(known: int, number: int) -> str:
+    """Why a goal is refused whose sender knows another stop than the last one."""
+    news = "this driver was started after the one that the sender knows"
+    if same_driver(known, number):
+        news = (
+            f"stop {stop_count(number)} came after stop {stop_count(known)}, which the sender knows"
+        )
+    return f"{news}: send it again if it still holds"

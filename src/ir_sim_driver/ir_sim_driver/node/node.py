@@ -6,6 +6,7 @@ import gc
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from builtin_interfaces.msg import Time
@@ -29,6 +30,7 @@ from ir_msgs_py.ros.diagnostics import Diagnostics
 from ir_msgs_py.ros.node_process import run_node
 from ir_msgs_py.ros.serving import BoundedService
 from ir_msgs_py.ros.topics import ACTION_SERVICES
+from ir_msgs_py.stops import before_first_stop
 from ir_sim_driver.controller import Driver, Joints, Simulation, ended_by_stop, make_simulation
 from ir_sim_driver.errors import DriverError, LinkError, TrajectoryRefusedError
 from ir_sim_driver.node.announcements import Announcements
@@ -107,7 +109,7 @@ class SimDriver(Node):
             options.cell,
             options.load,
             options.backend,
-            configuration.simulation,
+            replace(configuration.simulation, before_first_stop=before_first_stop()),
             plant=options.plant,
         )
         steps = round(1.0 / (options.joint_state_rate * simulation.settings.dt))
@@ -149,7 +151,8 @@ class SimDriver(Node):
         self._markers = self.create_publisher(MarkerArray, own(names.ROBOT_MARKERS), 1)
         self._robot = RobotMarkers((), ())
         self._diagnostics = Diagnostics(self)
-        self._drained = 0  # the last stop of before which no goal waits any more
+        # the last stop of before which no goal waits any more
+        self._drained = self._driver.stop_number
         self._trajectory_topic = TrajectoryTopic(self, self._driver, self._admit)
         self.create_subscription(
             Float64,

@@ -189,7 +189,11 @@ class Plc:
     """
 
     def __init__(
-        self, settings: PlcSettings, notices: Notices, mode: OperatingMode = OperatingMode.EXT
+        self,
+        settings: PlcSettings,
+        notices: Notices,
+        mode: OperatingMode = OperatingMode.EXT,
+        before_first_stop: int = 0,
     ) -> None:
         self._settings = settings
         self._notices = notices
@@ -197,7 +201,7 @@ class Plc:
         self.levels = PlcInputs(operating_mode=mode)
         self.operating_mode = mode
         self.rest: Mode | None = None
-        self.stop = StopMachine()
+        self.stop = StopMachine(before_first_stop)
         self.order = 0
         self._rose: dict[str, int] = {}
         self._stopped_by = ("", 0)  # who has stopped by a press, and the number of that stop
