@@ -76,6 +76,15 @@ def test_insecure_leaves_ros_s_own_variables() -> None:
     assert network_variables(own) == ({}, ())
 
 
+@pytest.mark.parametrize("name", ["loopback", "fast_discovery"])
+def test_a_profile_of_ours_says_how_messages_are_kept(name: str) -> None:
+    """Else the middleware keeps, for every message that ever waited, the size of the largest."""
+    choice = {} if name == "loopback" else {"IR_NETWORK": "insecure"}
+    assert network_variables(choice)[0]["RMW_FASTRTPS_USE_QOS_FROM_XML"] == "1"
+    text = Path(profile(name)).read_text(encoding="utf-8")
+    assert text.count("<historyMemoryPolicy>DYNAMIC</historyMemoryPolicy>") == 2
+
+
 NODE = """
 import os, sys
 from rclpy.node import Node

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import threading
 import time
+from array import array
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,9 +18,16 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.task import Future
 
 from ir_msgs.action import RunProgram
-from ir_msgs.srv import SetPlcInput
+from ir_msgs.srv import SetLoad, SetPlcInput
 from ir_msgs_py.ros.rclpy_inside import SENDS, UNDISCOVERED, PatientSender
-from ir_msgs_py.ros.serving import LOOK, BoundedService, RecordedActionServer, gone
+from ir_msgs_py.ros.serving import (
+    LOOK,
+    MOST_WAITING,
+    BoundedService,
+    RecordedActionServer,
+    RequestQueue,
+    gone,
+)
 from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.ros.topics import SERVICE
@@ -65,6 +77,74 @@ def test_every_request_of_a_burst_is_answered_in_its_order_or_refused(
     assert seen == [str(k) for k, good in enumerate(served) if good]
     assert MOST <= sum(served) < SENT
     assert said == {f"{MOST} requests of /bounded/ask are waiting: send fewer at once"}
+
+
+def test_requests_wait_up_to_a_number_of_bytes_and_the_first_whatever_its_size() -> None:
+    queue = RequestQueue("ask")
+    for size in (2 * MOST_WAITING, MOST_WAITING // 2):
+        request = SetLoad.Request(inertia=array("d", bytes(size)))
+        assert queue.add(request, lambda size=size: size) == ""
+        more = SetLoad.Request(inertia=array("d", bytes(MOST_WAITING // 2 + 8)))
+        refused = queue.add(more, lambda: "more")
+        assert refused.startswith("requests of ask that wait would take more than 64 MiB")
+        assert queue.pop() == size
+        assert len(queue) == 0
+
+
+HELD_UP = """
+import sys
+from rclpy.node import Node
+from ir_msgs.srv import SetLoad
+from ir_msgs_py.ros.node_process import run_node
+from ir_msgs_py.ros.serving import BoundedService
+
+class Holding(Node):
+    def __init__(self):
+        super().__init__("holding")
+        BoundedService(self, SetLoad, "~/ask", self.answer)
+
+    def answer(self, request, response):
+        if request.load == "hold":
+            sys.stdin.readline()
+        return response
+
+run_node("holding", Holding, sys.argv)
+"""
+
+
+def resident(pid: int) -> int:
+    """MB of memory of a process."""
+    status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
+    return int(status.partition("VmRSS:")[2].split()[0]) // 1024
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
+def test_the_memory_of_large_requests_is_given_back(
+    ros_executor: Any, ros_node: Any, wait_for: Any, ros_domain_id: int
+) -> None:
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(ros_domain_id)}
+    with subprocess.Popen(
+        [sys.executable, "-c", HELD_UP], stdin=subprocess.PIPE, env=environment, text=True
+    ) as server:
+        try:
+            client = ros_executor.run(
+                lambda: ros_node.create_client(SetLoad, "/holding/ask", qos_profile=SERVICE)
+            )
+            wait_for(client.service_is_ready, what="the service is offered")
+            before = resident(server.pid)
+            held = SetLoad.Request(load="hold")
+            large = SetLoad.Request(inertia=array("d", bytes(8_000_000)))
+            futures = ros_executor.run(
+                lambda: [client.call_async(each) for each in (held, *[large] * 15)]
+            )
+            wait_for(lambda: resident(server.pid) > before + 100, what="15 of 8 MB have come")
+            assert server.stdin is not None
+            server.stdin.write("\n")
+            server.stdin.flush()
+            wait_for(lambda: all(future.done() for future in futures), what="all are answered")
+            wait_for(lambda: resident(server.pid) < 1.2 * before, what="the memory is given back")
+        finally:
+            server.kill()
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,10 @@ MOST_DOMAIN = 232  # higher ones have no UDP ports left
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 PEERS = "ROS_STATIC_PEERS"
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
+BY_PROFILE = "RMW_FASTRTPS_USE_QOS_FROM_XML"
+"""Lets the profile say how messages are kept: without it the middleware keeps, for every message
+that ever waited, the memory of the largest.
+"""
 _SECURITY = {"ROS_SECURITY_ENABLE": "true", "ROS_SECURITY_STRATEGY": "Enforce"}
 _NARROW = ("LOCALHOST", "OFF")
 
@@ -56,13 +60,16 @@ def network_variables(environment: Mapping[str, str]) -> tuple[dict[str, str], t
         return {
             RANGE: narrow if narrow in _NARROW else "LOCALHOST",
             PROFILES: profile("loopback"),
+            BY_PROFILE: "1",
         }, (PEERS,)
     missing = [
         f"{name}={value}" for name, value in _SECURITY.items() if environment.get(name) != value
     ]
     if choice == "secure" and missing:
         raise ParameterError(f"{VARIABLE} is secure: {' and '.join(missing)} must be set as well")
-    return ({} if environment.get(PROFILES) else {PROFILES: profile("fast_discovery")}), ()
+    if environment.get(PROFILES):
+        return {}, ()
+    return {PROFILES: profile("fast_discovery"), BY_PROFILE: "1"}, ()
 
 
 def apply_network(environment: MutableMapping[str, str] = os.environ) -> None:

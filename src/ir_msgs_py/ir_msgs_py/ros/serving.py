@@ -13,6 +13,7 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any, ClassVar
 from weakref import WeakKeyDictionary, WeakSet
 
@@ -45,6 +46,8 @@ MOST_BYTES = 2 * 2**20
 """Of a request or an answer: the points of forty movements. What the middleware keeps for a
 recorder that is busy is at most WAITING of these twice.
 """
+MOST_WAITING = 64 * 2**20
+"""Bytes of the requests of a service that wait together; the first is taken whatever its size."""
 WAITING = 100
 LOOK = 0.05
 """s between two looks whether a client is still there: each takes a third of a millisecond."""
@@ -102,6 +105,40 @@ def _bounded(message: Any) -> array.array[int]:
     """The message's CDR; nothing where it is longer than MOST_BYTES."""
     data = serialize_message(message) if _left(message, MOST_BYTES) >= 0 else b""
     return array.array("B", data if len(data) <= MOST_BYTES else b"")
+
+
+class RequestQueue:
+    """Requests of the service `name` that wait, at most `most` and MOST_WAITING bytes together."""
+
+    def __init__(self, name: str, most: int = REQUESTS_WAITING) -> None:
+        self._name = name
+        self._most = most
+        self._entries: deque[tuple[Any, int]] = deque()
+        self._bytes = 0
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def add(self, request: Any, entry: Callable[[], Any]) -> str:
+        """Let an entry wait for a request, made by `entry`; why it may not, "" where it does."""
+        left = _left(request, MOST_WAITING)
+        size = MOST_WAITING - left
+        if len(self) >= self._most:
+            return f"{self._most} requests of {self._name} are waiting: send fewer at once"
+        if self._entries and self._bytes + size > MOST_WAITING:
+            return (
+                f"requests of {self._name} that wait would take more than {MOST_WAITING >> 20} "
+                "MiB: send fewer at once"
+            )
+        self._entries.append((entry(), size))
+        self._bytes += size
+        return ""
+
+    def pop(self) -> Any:
+        """The entry that has waited longest."""
+        entry, size = self._entries.popleft()
+        self._bytes -= size
+        return entry
 
 
 def _left(value: Any, left: int) -> int:
@@ -170,7 +207,7 @@ def with_status(response: Any, status: Status) -> None:
 
 
 class BoundedService(Waitable):
-    """A service of `node`; at most `waiting` requests wait in it.
+    """A service of `node`; at most `waiting` requests wait in it, and MOST_WAITING bytes.
 
     put: puts a status into a response, where that has no `status` of ours.
     handler: from request and response to the response; requests are answered in the order in which
@@ -198,7 +235,6 @@ class BoundedService(Waitable):
         self._type = service_type
         self._handler = handler
         self._put = put
-        self._most = waiting
         self._source = node.get_name()
         self._log = node.get_logger().error
         untouched = PolledGroup()  # the executor does not take from the service, this does
@@ -216,7 +252,7 @@ class BoundedService(Waitable):
             return
         self._calls.services.add(self._service)
         self._more = node.create_guard_condition(_nothing, callback_group=untouched)
-        self._waiting: deque[tuple[Any, Any, tuple[Gone, ...]]] = deque()
+        self._waiting = RequestQueue(self._service.service_name, waiting)
         self._index = 0
         node.add_waitable(self)
 
@@ -248,12 +284,11 @@ class BoundedService(Waitable):
         while True:
             taken = take_request(self._service)
             if taken is None:
-                return self._waiting.popleft() if self._waiting else None
-            if len(self._waiting) < self._most:
-                watch = (self._gone(taken[1]),) if self._watching else ()
-                self._waiting.append((*taken, watch))
-            else:
-                self._refuse(taken[1])
+                return self._waiting.pop() if self._waiting else None
+            request, header = taken
+            refusal = self._waiting.add(request, partial(self._watched, request, header))
+            if refusal:
+                self._send(self._response(Status(StatusCode.FAILURE, refusal)), header)
 
     async def execute(self, taken_data: tuple[Any, Any, tuple[Gone, ...]] | None) -> None:
         """Answer it."""
@@ -261,6 +296,9 @@ class BoundedService(Waitable):
             return
         request, header, watch = taken_data
         self._send(self._answer(request, self._type.Response(), *watch), header)
+
+    def _watched(self, request: Any, header: Any) -> tuple[Any, Any, tuple[Gone, ...]]:
+        return request, header, (self._gone(header),) if self._watching else ()
 
     def _gone(self, header: Any) -> Gone:
         """Whether the client of a request has gone."""
@@ -278,12 +316,6 @@ class BoundedService(Waitable):
             self._log(traceback.format_exc())
             response = self._response(unexpected(error))
         return response
-
-    def _refuse(self, header: Any) -> None:
-        sentence = (
-            f"{self._most} requests of {self._service.service_name} are waiting: send fewer at once"
-        )
-        self._send(self._response(Status(StatusCode.FAILURE, sentence)), header)
 
     def _send(self, response: Any, header: Any) -> None:
         """Send a response, or that it can't be sent; whether or not its client is still there."""

@@ -16,6 +16,7 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 from rclpy.context import Context
@@ -40,7 +41,7 @@ from ir_msgs_py.ros.rclpy_inside import (
     take_bytes,
     take_request,
 )
-from ir_msgs_py.ros.serving import ANY, Calls, unexpected
+from ir_msgs_py.ros.serving import ANY, Calls, RequestQueue, unexpected
 from ir_msgs_py.ros.topics import BURST, REQUESTS_WAITING, SERVICE, PolledGroup
 from ir_msgs_py.status import Status, StatusCode
 from ir_sim_driver.controller import Driver
@@ -407,7 +408,7 @@ class PolledService:
 
     owner: in whose name. handler: from request, response, the time at which the request came [ns
     of the monotonic clock] and its client. urgent: whether a request goes before all that wait. At
-    most REQUESTS_WAITING wait; what comes beyond is refused.
+    most REQUESTS_WAITING wait, and MOST_WAITING bytes; what comes beyond is refused.
     """
 
     def __init__(
@@ -437,7 +438,7 @@ class PolledService:
         self._calls = Calls.of(owner)
         self._calls.services.add(self._service)
         self._sender = patient_sender(self._service, _SENDS)
-        self._waiting: deque[tuple[Any, Any, int]] = deque()
+        self._waiting = RequestQueue(self._service.service_name)
         self._answers = _Answers()
 
     def close(self) -> None:
@@ -448,7 +449,7 @@ class PolledService:
         """Answer a turn of what has come, urgent ones first; the number of requests."""
         came = self._take() if self._polled else 0
         for _ in range(min(TURN, len(self._waiting))):
-            self._answer(*self._waiting.popleft())
+            self._answer(*self._waiting.pop())
         return came + len(self._waiting)
 
     def _take(self) -> int:
@@ -462,10 +463,8 @@ class PolledService:
             came = _by_own_clock(header.received_timestamp, ahead)
             if self._urgent(request):
                 self._answer(request, header, came, urgent=True)
-            elif len(self._waiting) < REQUESTS_WAITING:
-                self._waiting.append((request, header, came))
-            else:
-                self._refuse(header)
+            elif refusal := self._waiting.add(request, partial(tuple, (request, header, came))):
+                self._refuse(refusal, header)
         return _REQUESTS
 
     def _answer(self, request: Any, header: Any, came: int, *, urgent: bool = False) -> None:
@@ -478,7 +477,7 @@ class PolledService:
             response.status = self._status(unexpected(error))
         self._answers.submit(lambda: self._send(answered, response, header), urgent=urgent)
 
-    def _refuse(self, header: Any) -> None:
+    def _refuse(self, sentence: str, header: Any) -> None:
         if len(self._answers) >= REQUESTS_WAITING:  # nobody waits for so many
             self._log(
                 f"requests of {self._service.service_name} come faster than they can be refused: "
@@ -486,10 +485,6 @@ class PolledService:
                 throttle_duration_sec=_SAID_AGAIN,
             )
             return
-        sentence = (
-            f"{REQUESTS_WAITING} requests of {self._service.service_name} are waiting: send fewer "
-            "at once"
-        )
         response = self._type.Response()
         response.status = self._status(Status(StatusCode.FAILURE, sentence))
         self._answers.submit(lambda: self._send(_nothing, response, header))
