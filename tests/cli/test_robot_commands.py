@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 import shutil
@@ -11,9 +12,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ir_cli import robot_from_urdf
 from ir_cli.main import main
+from ir_cli.robot_from_urdf import RobotSource
 from ir_cli.robot_remarks import remarks_on
+from ir_cli.robot_shapes import Shapes, capsules_of
+from ir_cli.self_pairs import Pairs, kept_sentences
 from ir_description import load_cell, load_robot, robot_named, robot_urdf
+from ir_description.robot import ReducedDistance
 from ir_kernels import Chain, DynamicsModel
 
 EXACT = 1e-9
@@ -128,6 +134,45 @@ def test_a_check_names_links_that_are_near_in_most_postures() -> None:
         for each in found
     )
     assert {each.severity for each in found} == {"warning"}
+
+
+def test_two_links_that_are_near_by_construction_have_one_sentence_on_their_least_pair() -> None:
+    robot = load_robot("kr210_r2700_extra")
+    one, other, third = (
+        [each.name for each in robot.capsules if each.link == link] for link in (0, 2, 3)
+    )
+    far = [*itertools.product(one, other), *itertools.product(one, third)]
+    reduced = [ReducedDistance(*pair, 0.01 - 0.001 * k, "near") for k, pair in enumerate(far)]
+    sentences = kept_sentences(reduced, robot.capsules)
+    assert len(sentences) == 2
+    last = far[len(one) * len(other) - 1]
+    assert sentences[0].startswith(f"{last[0]} and {last[1]} keep")
+    assert sentences[1].startswith(f"{far[-1][0]} and {far[-1][1]} ")
+
+
+@pytest.mark.parametrize(("left", "taken"), [(0.3, 0), (0.5, 1)])
+def test_tighter_capsules_are_taken_unless_they_leave_fewer_postures(
+    left: float, taken: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before them four of ten are left; the tighter ones have one capsule more."""
+    path = tmp_path / "robot.urdf"
+    path.write_text(robot_urdf(load_robot("ur10e")))
+    fits: list[Shapes] = []
+
+    def fitted(*given: object) -> Shapes:
+        some = capsules_of(*given[:4])  # type: ignore[arg-type]
+        extra = replace(some.capsules[-1], name="extra")
+        last = (*some.capsules, extra) if len(given) > 4 else some.capsules
+        fits.append(Shapes(last, some.sentences))
+        return fits[-1]
+
+    def paired(*given: object) -> Pairs:
+        return Pairs((), (), frozenset({(4, 6)}), left if len(given) > 6 else 0.4)
+
+    monkeypatch.setattr(robot_from_urdf, "capsules_of", fitted)
+    monkeypatch.setattr(robot_from_urdf, "pairs_of", paired)
+    made = robot_from_urdf.made_robot(RobotSource(path, payload=10.0))
+    assert made.shapes is fits[taken]
 
 
 def test_all_errors_of_a_file_are_printed_in_one_run(

@@ -14,7 +14,7 @@ from ir_cli.errors import CommandError, InputError
 from ir_cli.home_posture import Postures
 from ir_cli.robot_remarks import remarks_on
 from ir_cli.robot_shapes import Shapes, capsules_of
-from ir_cli.self_pairs import Pairs, kept_sentence, pairs_of
+from ir_cli.self_pairs import Pairs, kept_sentences, pairs_of
 from ir_description import DescriptionError, InvalidValueError, RobotFileError, RobotModel
 from ir_description.files import read_regular_file, robot_from_yaml, text_of
 from ir_description.files.making import (
@@ -101,8 +101,10 @@ def _made(source: RobotSource) -> MadeRobot:
     shapes = capsules_of(arm, bodies, names, sheet.radii)
     pairs = pairs_of(arm, shapes.capsules, bodies, low, high, home)
     if pairs.unclear:
-        shapes = capsules_of(arm, bodies, names, sheet.radii, shapes, pairs.unclear)
-        pairs = pairs_of(arm, shapes.capsules, bodies, low, high, home, pairs.unclear)
+        more = capsules_of(arm, bodies, names, sheet.radii, shapes, pairs.unclear)
+        tighter = pairs_of(arm, more.capsules, bodies, low, high, home, pairs.unclear)
+        if tighter.left >= pairs.left:
+            shapes, pairs = more, tighter
     notes = [*arm.notes, *meshes.notes, *masses, *sheet.notes]
     if given is None:
         sheet = with_home(sheet, _home(arm, sheet, shapes, pairs, (low, high)))
@@ -216,7 +218,7 @@ def _say(out: Path, made: MadeRobot) -> None:
         f"{bodies} bodies of the URDF in {len(robot.capsules)} capsules; "
         f"{len(robot.self_pairs)} pairs of them can touch, neighbours are left out"
     )
-    lines += [kept_sentence(each) for each in made.pairs.reduced]
+    lines += kept_sentences(made.pairs.reduced, robot.capsules)
     guessed = sorted({p.rpartition(".")[2] for p, mark in robot.marks.items() if mark == "L"})
     if guessed:
         lines.append(f"estimated (confidence L): {', '.join(guessed)}")

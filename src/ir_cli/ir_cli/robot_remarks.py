@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ir_cli.self_pairs import kept_sentence
+from ir_cli.self_pairs import kept_sentences
 from ir_description import Load, RobotModel
 from ir_kernels import (
     Chain,
@@ -109,12 +109,8 @@ def _near_itself(robot: RobotModel, chain: Chain) -> Iterator[Remark]:
         if robot.self_pairs
         else np.zeros(0)
     )
-    for reduced in robot.reduced_distances:
-        yield Remark(
-            "note",
-            "self_pairs",
-            kept_sentence(reduced),
-        )
+    for sentence in kept_sentences(robot.reduced_distances, robot.capsules):
+        yield Remark("note", "self_pairs", sentence)
     for z in np.flatnonzero(near > NEAR):
         pair = model.pairs[int(z)]
         often = f"{1e3 * MARGIN:g} mm in {100.0 * near[z]:.0f} % of {POSTURES} postures"

@@ -62,12 +62,13 @@ _AT_ONCE = (30, 300)  # pieces, the nearest first, before all others are looked 
 class Pairs(NamedTuple):
     """Pairs of capsules that can touch; those of them that keep a distance of their own; unclear:
     pairs of links, the lower one first, whose capsules leave hardly a posture, or forbid the given
-    home.
+    home; left: share of the sampled postures that all pairs leave, 0 where they forbid that home.
     """
 
     pairs: tuple[tuple[str, str], ...]
     reduced: tuple[ReducedDistance, ...]
     unclear: frozenset[tuple[int, int]] = frozenset()
+    left: float = 1.0
 
 
 def pairs_of(
@@ -101,6 +102,7 @@ def pairs_of(
             groups.setdefault((one, other), []).append(z)
     reduced = []
     unclear: set[tuple[int, int]] = set()
+    least = np.full(len(model.pairs), SAFETY)
     for links, near in groups.items():
         rings = _Rings(chain, *links, surfaces)
         own = []
@@ -109,6 +111,7 @@ def pairs_of(
             lower, upper = sorted(pair, key=lambda each: each.link)
             own.append(_own_distance(distance[:, z], _Meeting(chain, lower, upper, rings, q)))
         kept = np.array([each for each, _ in own])
+        least[near] = kept
         left = float((distance[:, near] > kept).all(axis=1).mean())
         free_at_home = home is None or (model.distances(home[None])[0, near] > kept).all()
         if left < LEAST_LEFT or not free_at_home:
@@ -116,7 +119,10 @@ def pairs_of(
         for z, (each, reason) in zip(near, own, strict=True):
             said = f"{reason}; leaves {100.0 * left:.1f} %" if left < LEAST_LEFT else reason
             reduced.append(ReducedDistance(*model.pairs[z][1:], each, said))
-    return Pairs(tuple(far), tuple(reduced), frozenset(unclear))
+    leaves = float((distance > least).all(axis=1).mean())
+    if home is not None and (model.distances(home[None])[0] <= least).any():
+        leaves = 0.0
+    return Pairs(tuple(far), tuple(reduced), frozenset(unclear), leaves)
 
 
 def _own_distance(distance: FloatArray, meeting: _Meeting) -> tuple[float, str]:
@@ -140,15 +146,25 @@ def _own_distance(distance: FloatArray, meeting: _Meeting) -> tuple[float, str]:
     )
 
 
-def kept_sentence(reduced: ReducedDistance) -> str:
-    """What a pair that is near by construction keeps, and why."""
-    first, second, distance, reason = reduced
-    keep = (
-        f"keep {1e3 * distance:.1f} mm, or the safety distance where that is less"
-        if distance >= 0.0
-        else f"are capsules that may overlap by {-1e3 * distance:.1f} mm"
-    )
-    return f"{first} and {second} {keep}: {reason}"
+def kept_sentences(reduced: Sequence[ReducedDistance], capsules: Sequence[Capsule]) -> list[str]:
+    """What pairs of capsules keep that are near by construction, and why: a sentence for two links,
+    on their pair that keeps least.
+    """
+    link = {each.name: each.link for each in capsules}
+    groups: dict[tuple[int, ...], list[ReducedDistance]] = {}
+    for each in reduced:
+        groups.setdefault(tuple(sorted(link[name] for name in each[:2])), []).append(each)
+    found = []
+    for own in groups.values():
+        first, second, distance, reason = min(own, key=lambda each: each.distance)
+        keep = (
+            f"keep {1e3 * distance:.1f} mm, or the safety distance where that is less"
+            if distance >= 0.0
+            else f"are capsules that may overlap by {-1e3 * distance:.1f} mm"
+        )
+        more = f" (the least of {len(own)} pairs of their links)" if len(own) > 1 else ""
+        found.append(f"{first} and {second} {keep}{more}: {reason}")
+    return found
 
 
 class _Pieces(NamedTuple):
