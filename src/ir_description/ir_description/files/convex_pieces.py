@@ -169,7 +169,8 @@ def _beside(along: FloatArray, at: FloatArray) -> FloatArray:
 
 
 def _dot(first: FloatArray, second: FloatArray) -> FloatArray:
-    return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
+    product: FloatArray = first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
+    return product
 
 
 def _cross(first: FloatArray, second: FloatArray) -> FloatArray:
