@@ -235,7 +235,8 @@ def test_the_image_s_first_process_becomes_the_node_that_is_named(tmp_path: Path
     node.chmod(0o755)
     (tmp_path / "entrypoint.sh").write_text(text)
     command = ["bash", str(tmp_path / "entrypoint.sh"), "ir_planner", "--ros-args"]
-    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    system = {"PATH": "/usr/bin:/bin"}  # a caller's own path may lead to another node of that name
+    said = subprocess.run(command, capture_output=True, text=True, check=True, env=system).stdout
     sourced, own, words = said.split()
     assert sourced == own  # the shell was replaced: signals reach the node
     assert words == "--ros-args"
