@@ -16,6 +16,7 @@ from ir_msgs_py import names
 from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.ros.topics import LATCHED
+from ir_msgs_py.stops import stop_count
 from ir_sim_driver.node import SimDriver
 
 PRESSED = PlcInputs(emergency_stop=True, move_enable=True)
@@ -48,7 +49,10 @@ def test_presses_count_beside_a_busy_executor_and_each_has_one_number(
                 ros_node.create_publisher(PlcInputs, f"/{names.PLC_INPUTS}", quality),
                 ros_node.create_client(SetPlcInput, f"/{names.SET_PLC_INPUT}"),
                 ros_node.create_subscription(
-                    UInt64, f"/{names.STOP_NUMBER}", lambda msg: numbers.append(msg.data), LATCHED
+                    UInt64,
+                    f"/{names.STOP_NUMBER}",
+                    lambda msg: numbers.append(stop_count(msg.data)),
+                    LATCHED,
                 ),
             )
         )

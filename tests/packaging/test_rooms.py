@@ -26,8 +26,8 @@ ROOMS = {
         "cell_review",
     ),
     "ir_sim_driver": (
-        "errors", "notices", "plant", "power", "load_check", "motion", "plc", "controller", "node",
-        "contract",
+        "errors", "emergency_stop", "notices", "plant", "power", "load_check", "motion", "plc",
+        "controller", "node", "contract",
     ),
 }  # fmt: skip
 
