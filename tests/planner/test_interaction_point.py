@@ -311,16 +311,21 @@ def test_a_step_that_collides_is_set_back_twice_at_most_and_else_taken_back(
     assert {0, 3} < ends
 
 
+def starts_for_the_lathe(scene: PlanningScene) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Starts (60, n) [rad], the pose (4, 4) they look for, and what pairs have to keep [m]."""
+    robot = scene.cell.robot
+    rng = np.random.default_rng(1)
+    starts = random_starts(robot.position_min, robot.position_max, 60, "uniform", rng)
+    pose = np.array(scene.station("lathe_work").pose)
+    return starts, pose, scene.thresholds(0.02, "lathe_work")
+
+
 def test_a_start_is_given_up_after_three_sweeps_in_a_row_without_gain(
     scene_of: Callable[[str], PlanningScene],
 ) -> None:
     """Judge: Psi of eq. (2) of every sweep."""
     scene = scene_of("demo")
-    robot = scene.cell.robot
-    rng = np.random.default_rng(1)
-    starts = random_starts(robot.position_min, robot.position_max, 60, "uniform", rng)
-    pose = np.array(scene.station("lathe_work").pose)
-    threshold = scene.thresholds(0.02, "lathe_work")
+    starts, pose, threshold = starts_for_the_lathe(scene)
     asked = InteractionSettings(sweeps=30, newton_steps=0)
     work = Work(10_000, np.inf, lambda: 0.0)
     found = descend(pose, starts, scene, threshold, asked, work)
@@ -345,10 +350,7 @@ def test_newtons_steps_are_tried_after_every_so_many_sweeps_and_after_the_last(
     """Judge: Newton's steps from what each start has reached by then."""
     scene = scene_of("demo")
     robot = scene.cell.robot
-    rng = np.random.default_rng(1)
-    starts = random_starts(robot.position_min, robot.position_max, 60, "uniform", rng)
-    pose = np.array(scene.station("lathe_work").pose)
-    threshold = scene.thresholds(0.02, "lathe_work")
+    starts, pose, threshold = starts_for_the_lathe(scene)
     asked = InteractionSettings(sweeps=sweeps, finish_every=every, set_back=NONE)
     newton = CcdSettings(0.5, asked.xi, 0, asked.newton_steps)
     found = descend(pose, starts, scene, threshold, asked, Work(10_000, np.inf, lambda: 0.0))

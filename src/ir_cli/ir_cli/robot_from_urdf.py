@@ -104,7 +104,8 @@ def _made(source: RobotSource) -> MadeRobot:
         more = capsules_of(arm, bodies, names, sheet.radii, shapes, pairs.unclear)
         tighter = pairs_of(arm, more.capsules, bodies, low, high, home, pairs.unclear)
         if tighter.left >= pairs.left:
-            shapes, pairs = more, tighter
+            shapes = more
+            pairs = tighter
     notes = [*arm.notes, *meshes.notes, *masses, *sheet.notes]
     if given is None:
         sheet = with_home(sheet, _home(arm, sheet, shapes, pairs, (low, high)))

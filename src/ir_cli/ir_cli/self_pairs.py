@@ -12,6 +12,7 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from collections.abc import Sequence, Set
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -104,7 +105,7 @@ def pairs_of(
     unclear: set[tuple[int, int]] = set()
     least = np.full(len(model.pairs), SAFETY)
     for links, near in groups.items():
-        rings = _Rings(chain, *links, surfaces)
+        rings = _Rings(chain, *links, surfaces, q[:_COUNTED])
         own = []
         for z in near:
             pair = (named[name] for name in model.pairs[z][1:])
@@ -406,35 +407,38 @@ def _thinned(rows: IntArray, most: int) -> IntArray:
 class _Rings:
     """Rings about the joint that leads from a link towards another one, in which their surfaces
     meet by construction, as a shaft in its housing: what turns in something meets it all around.
+
+    q (N, n): the postures in which they are counted.
     """
 
-    def __init__(self, chain: Chain, first: int, second: int, surfaces: _Surfaces) -> None:
+    def __init__(
+        self, chain: Chain, first: int, second: int, surfaces: _Surfaces, q: FloatArray
+    ) -> None:
         self.surfaces = surfaces
         self._chain = chain
         self._links = (first, second)
-        self._counts: tuple[Counter[tuple[float, ...]], ...] = ()
+        self._q = q
 
-    def away(self, side: int, pieces: _Pieces, q: FloatArray) -> BoolArray:
+    def away(self, side: int, pieces: _Pieces) -> BoolArray:
         """Which pieces (N,) of the first link, or of the second, lie beside no ring that is built
-        so, as seen in postures q.
+        so.
         """
-        if not self._counts:
-            self._counts = self._counted(q)
         count = self._counts[side]
-        usual = [ring for ring, times in count.items() if times >= _BUILT_SO * len(q)]
+        usual = [ring for ring, times in count.items() if times >= _BUILT_SO * len(self._q)]
         places, of = self._cells(side, pieces.at)
         if not (len(usual) and len(places)):
             return np.ones(len(of), dtype=bool)
         far, _ = cKDTree(np.array(usual)).query(places)
         return np.asarray(far > _BESIDE / _RING)[of]
 
-    def _counted(self, q: FloatArray) -> tuple[Counter[tuple[float, ...]], ...]:
+    @cached_property
+    def _counts(self) -> tuple[Counter[tuple[float, ...]], ...]:
         """In how many postures a piece of each ring of both links meets the other link, or nearly
         does: with any of its capsules.
         """
         counts: tuple[Counter[tuple[float, ...]], ...] = (Counter(), Counter())
         sides = [self.surfaces.capsules(link) for link in self._links]
-        for poses in _relative(self._chain, *self._links, q):
+        for poses in _relative(self._chain, *self._links, self._q):
             met: tuple[set[tuple[float, ...]], ...] = (set(), set())
             for pair in itertools.product(*sides):
                 for side in (0, 1):
@@ -515,8 +519,7 @@ class _Meeting:
         if float((distance > found).mean()) >= _LEFT:
             return found
         self._counted = tuple(
-            self._rings.away(side, pieces, self._q[:_COUNTED])
-            for side, pieces in enumerate(self._sides)
+            self._rings.away(side, pieces) for side, pieces in enumerate(self._sides)
         )
         if all(each.all() for each in self._counted):
             return found
