@@ -8,11 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from ir_description import cell_from_yaml, load_power_data
+from ir_description import Cell, cell_from_yaml, load_cell, load_power_data
 from ir_msgs.msg import PowerMode
-from ir_msgs_py.modes import MODES, RESTS, ModeRow, TransitionTimes
+from ir_msgs_py.modes import MODES, RESTS, Mode, ModeRow, TransitionTimes
 from ir_msgs_py.plc import PlcInputs
 from ir_planner import Planner
+from ir_planner.program.pauses import mode_watts
+from ir_planner.scene.planning_scene import load_text, scene_with
+from ir_recorder.analysis.predicted_power import resting_watts
 from ir_recorder.report.picture import MODE_COLOURS
 from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
 from ir_sim_driver.controller.simulation import make_simulation
@@ -83,6 +86,43 @@ def test_the_plant_rests_in_it_as_the_row_says(row: ModeRow) -> None:
     after = simulation.mains.meter.reading()
     watts = (after.energy - before.energy) / (after.time - before.time)
     assert watts == pytest.approx(simulation.standing_power(row.mode), rel=1e-6)
+
+
+def with_bus_watts(watts: float) -> Cell:
+    """The demonstration with a tool that draws so many watts while the drive bus is up."""
+    cell = load_cell("demo")
+    assert cell.tool is not None
+    return replace(cell, tool=replace(cell.tool, watts_drive_bus=watts))
+
+
+def plant_watts(cell: Cell, row: ModeRow) -> float:
+    """What the meter of an ideal plant reads in a mode at machine home."""
+    controller = ControllerSettings(start_mode=row.mode.name)
+    simulation = make_simulation(
+        cell, backend="ideal", settings=SimulationSettings(controller=controller)
+    )
+    if row.bit:
+        simulation.plc.rest = row.mode
+    before = simulation.mains.energy()
+    simulation.run(0.5)
+    return (simulation.mains.energy() - before) / 0.5
+
+
+@pytest.mark.parametrize("watts", [0.0, 73.0])
+def test_planner_driver_and_report_give_a_load_its_bus_watts_alike(
+    row: ModeRow, watts: float
+) -> None:
+    power = load_power_data()
+    cell = with_bus_watts(watts)
+    scene = scene_with(cell, load_text(cell), power)
+    home = cell.machine_home
+    planned = mode_watts(row.mode.name, home, scene)
+    assert plant_watts(cell, row) == pytest.approx(planned, rel=1e-9)
+    assert resting_watts(row.mode.name, home, cell, scene.loads, power) == pytest.approx(planned)
+    without = scene_with(with_bus_watts(0.0), load_text(cell), power)
+    more = planned - mode_watts(row.mode.name, home, without)
+    awake = row.mode in (Mode.STAND_ON_MOTORS, Mode.STAND_ON_BRAKES)  # Table II of the paper
+    assert more == pytest.approx(watts if awake else 0.0, abs=1e-9)
 
 
 def test_the_report_has_a_colour_for_it(row: ModeRow) -> None:

@@ -25,6 +25,7 @@ from ir_description import (
     load_cell,
 )
 from ir_description.files import read_regular_file
+from ir_msgs_py.modes import drive_bus_up
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
@@ -261,10 +262,9 @@ class Design:
         """Count a stay of so many seconds in a mode at q (n,)."""
         still = np.zeros(len(self._scale))
         still[self._prior.index(f"watts.{mode}")] = 1.0
-        watts = sum(load.watts_always for load in loads)
-        if mode in ("STAND_ON_MOTORS", "STAND_ON_BRAKES"):
-            watts += sum(load.watts_drive_bus for load in loads)
-        still[self._prior.index("tool_watts")] = watts
+        still[self._prior.index("tool_watts")] = sum(
+            load.watts(drive_bus=drive_bus_up(mode)) for load in loads
+        )
         if mode == "STAND_ON_MOTORS":
             still[self._prior.index("drives_watts")] = 1.0
             still[self._prior.index(IDLE)] = 1.0

@@ -87,9 +87,14 @@ OFF_THE_NETWORK = frozenset(
 DRIVES_ON = READY | {
     m for row in RESTS if row.drives_on for m in (row.mode, row.entering, row.leaving)
 }
-"""Modes with the drive bus up: a movement may be asked for."""
+"""Modes with the drive bus up: a movement may be asked for, a load draws its watts_drive_bus."""
 REST_OF_BIT = {row.bit: row.mode for row in RESTS if row.bit}
 """The mode that each PLC bit of the power management asks for."""
+
+
+def drive_bus_up(name: str) -> bool:
+    """Whether the drive bus is up in the mode of this name, by `DRIVES_ON`."""
+    return any(mode.name == name for mode in DRIVES_ON)
 
 
 def modes_of(power_mode: str) -> tuple[Mode, ...]:

@@ -358,6 +358,10 @@ class Load:
         if len(set(names)) != len(names):
             raise InvalidValueError(f"load {self.name} names a capsule twice")
 
+    def watts(self, *, drive_bus: bool) -> float:
+        """Electrical power [W], with the drive bus up or off."""
+        return self.watts_always + (self.watts_drive_bus if drive_bus else 0.0)
+
     def placed(self, pose: FloatArray) -> Load:
         """Return the load with its geometry re-expressed by the pose (4, 4) of its frame in another
         frame.

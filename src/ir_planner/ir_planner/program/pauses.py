@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from ir_msgs_py.modes import DEEPER, DRIVES_ON, REST_MODES, Mode, TransitionTimes, modes_of
+from ir_msgs_py.modes import DEEPER, REST_MODES, TransitionTimes, drive_bus_up, modes_of
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_planner.checks import (
     MovementEnergy,
@@ -247,7 +247,7 @@ def mode_watts(name: str, q: FloatArray, scene: PlanningScene) -> float:
         return table.watts(name, q.tolist(), scene.load_mass)
     if name == MOTORS:
         return holding_watts(q, scene)
-    return scene.power.mode(name).controller_watts + scene.tool_watts(drive_bus=name == BRAKES)
+    return scene.power.mode(name).controller_watts + scene.tool_watts(drive_bus=drive_bus_up(name))
 
 
 def rests_at(q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> Rests:
@@ -268,18 +268,13 @@ def _rests_at(posture: tuple[float, ...], scene: PlanningScene, times: Transitio
                 times.enter(name),
                 times.minimum_stay(name),
                 times.leave(name),
-                bus_is_off(name),
+                not drive_bus_up(name),
             )
             for name in REST_MODES[1:]
             if name in [mode.name for mode in scene.power.modes]
         ),
         recharge_of(scene),
     )
-
-
-def bus_is_off(name: str) -> bool:
-    """Whether the drive bus is off in a mode."""
-    return Mode[name] not in DRIVES_ON
 
 
 def recharge_of(scene: PlanningScene) -> Recharge:
@@ -324,7 +319,7 @@ def _mode_slope(mode: str, q: FloatArray, scene: PlanningScene) -> FloatArray:
         return np.zeros(len(scene.parameters.names))
     if mode == MOTORS:
         return holding_slope(q, scene)
-    return standing_slope(1.0, scene, mode, drive_bus=mode == BRAKES)
+    return standing_slope(1.0, scene, mode, drive_bus=drive_bus_up(mode))
 
 
 # Pauses of a program as they are sent, with the mode that they are spent in and what they cost.

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ir_msgs_py.modes import REST_MODES, Mode, PowerMode, TransitionTimes
+from ir_msgs_py.modes import REST_MODES, Mode, PowerMode, TransitionTimes, drive_bus_up
 from ir_msgs_py.status import StatusCode
 from ir_planner.checks import JouleInterval, interval, spread
 from ir_planner.errors import RequestError
@@ -20,7 +20,6 @@ from ir_planner.program.pauses import (
     RestStep,
     Steps,
     at_once,
-    bus_is_off,
     mode_watts,
     over_by,
     pause_slope,
@@ -489,6 +488,7 @@ def _mode(name: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes
     enter = times.enter(name)
     leave = times.leave(name)
     stay = times.minimum_stay(name)
+    recharge = 0.0 if drive_bus_up(name) else recharge_of(scene).whole
     return PowerMode(
         mode=Mode[name],
         name=name,
@@ -499,7 +499,7 @@ def _mode(name: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes
         regular_time_to_operate=leave,
         time_min_length_of_stay=stay,
         energy_to_pause=motors * enter,
-        energy_to_operate=motors * leave + (recharge_of(scene).whole if bus_is_off(name) else 0.0),
+        energy_to_operate=motors * leave + recharge,
         break_even=break_even(name, q, scene, times),
     )
 
@@ -532,7 +532,7 @@ def break_even(name: str, q: FloatArray, scene: PlanningScene, times: Transition
 
     def charged(mode: str, pause: float) -> float:
         off = pause - times.enter(mode) - times.leave(mode)
-        return recharge.joules(max(off, 0.0)) if bus_is_off(mode) else 0.0
+        return 0.0 if drive_bus_up(mode) else recharge.joules(max(off, 0.0))
 
     pays = (extra[1] - extra[0]) / gain
     for _ in range(_ROUNDS):  # charging the DC link costs more after longer pauses, up to a bound

@@ -269,9 +269,7 @@ class PlanningScene:
 
     def tool_watts(self, *, drive_bus: bool) -> float:
         """Watts of what is attached, with its share of the drive bus where that is up."""
-        loads = self._attached
-        bus = sum(load.watts_drive_bus for load in loads) if drive_bus else 0.0
-        return sum(load.watts_always for load in loads) + bus
+        return float(sum(load.watts(drive_bus=drive_bus) for load in self._attached))
 
     @cached_property
     def _attached(self) -> tuple[Load, ...]:

@@ -106,7 +106,7 @@ class IndirectMeter:
         wanted = (axes + of("iron") * speed**2).sum(axis=1) + value(IDLE)
         flow = bus_flow(self._link, wanted, step, size=value(LINK))
         base = value("watts.STAND_ON_MOTORS") + value("drives_watts")
-        tool = sum(load.watts_always + load.watts_drive_bus for load in loads)
+        tool = sum(load.watts(drive_bus=True) for load in loads)
         bus = flow.watts.mean() / value("rectifier_efficiency")
         return float((bus + base + value("tool_watts") * tool) * (end - start))
 

@@ -23,6 +23,7 @@ from ir_description import (
 from ir_description.files import power_from_yaml
 from ir_description.robot import DcLink
 from ir_kernels import DynamicsModel
+from ir_msgs_py.modes import drive_bus_up
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.format import contents
@@ -75,7 +76,6 @@ def recorded_link(recording: Recording, data: PowerData) -> DcLink:
 
 MOTORS = "STAND_ON_MOTORS"
 BRAKES = "STAND_ON_BRAKES"
-_BUS_UP = (MOTORS, BRAKES)  # modes in which the drive bus feeds the tool
 
 
 def resting_watts(
@@ -87,9 +87,8 @@ def resting_watts(
     table = data.measured_rest(mode)
     if table is not None:
         return table.watts(mode, q.tolist(), float(sum(load.mass for load in loads)))
-    watts = data.resting(mode).controller_watts + sum(load.watts_always for load in loads)
-    if mode in _BUS_UP:
-        watts += sum(load.watts_drive_bus for load in loads)
+    tool = sum(load.watts(drive_bus=drive_bus_up(mode)) for load in loads)
+    watts = data.resting(mode).controller_watts + tool
     if mode != MOTORS:
         return float(watts)
     model = DynamicsModel(cell.robot, loads)

@@ -114,8 +114,8 @@ def _of_the_paper(loads: tuple[Load, ...], payload: float, data: PowerData) -> b
     listed = {row.payload for row in data.table_2}
     if not any(abs(payload - mass) < SAME_MASS for mass in listed):
         return False
-    always = sum(load.watts_always for load in loads)
-    awake = always + sum(load.watts_drive_bus for load in loads)
+    always = sum(load.watts(drive_bus=False) for load in loads)
+    awake = sum(load.watts(drive_bus=True) for load in loads)
     for mode, watts in (("HIBERNATION", always), ("STAND_ON_BRAKES", awake)):
         tool = data.measured(round(payload), mode) - data.mode(mode).controller_watts
         if abs(tool - watts) > SAME_WATTS:

@@ -11,6 +11,7 @@ from scipy.linalg import solve_banded
 
 from ir_description import IDLE, LINK, PowerParameters, RobotModel, centre_directions
 from ir_description.robot import DcLink
+from ir_msgs_py.modes import drive_bus_up
 from ir_recorder.errors import RecorderError
 from ir_recorder.measure.arm import ArmTorques, arm_torques, centre_torques
 from ir_recorder.measure.samples import Samples
@@ -162,7 +163,6 @@ def _joules(link: DcLink, volts: float) -> float:
 # efficiency and the standing watts come on top.
 
 STILL = 1e-3  # rad/s over which friction changes its sign
-_BUS_UP = ("STAND_ON_MOTORS", "STAND_ON_BRAKES")  # modes in which the drive bus feeds the tool
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +213,7 @@ class PowerModel:
         parts = [np.zeros((len(samples), self.robot.n)) for _ in range(4)]
         watts = np.zeros(len(samples))
         bus_up = np.isin(
-            samples.mode, [k for k, mode in enumerate(self.layout.modes) if mode in _BUS_UP]
+            samples.mode, [k for k, mode in enumerate(self.layout.modes) if drive_bus_up(mode)]
         )
         for k in np.unique(samples.load):
             rows = samples.load == k
@@ -223,8 +223,8 @@ class PowerModel:
                 parts, (own.links, own.loads, own.rotors, own.counterbalance), strict=True
             ):
                 part[rows] = each
-            watts[rows] = sum(load.watts_always for load in loads)
-            watts[rows & bus_up] += sum(load.watts_drive_bus for load in loads)
+            watts[rows] = sum(load.watts(drive_bus=False) for load in loads)
+            watts[rows & bus_up] = sum(load.watts(drive_bus=True) for load in loads)
         centres = np.zeros((0, len(samples), self.robot.n))
         if self.layout.centres:
             directions = centre_directions(self.robot)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ir_kernels.power import Regeneration
-from ir_msgs_py.modes import Mode
+from ir_msgs_py.modes import DRIVES_ON, Mode
 from ir_sim_driver.plant.backend import Work
 from ir_sim_driver.plant.drivetrain import DriveLosses
 from ir_sim_driver.plant.plant_parameters import LinkFigures, Plant, StandingWatts
@@ -38,7 +38,7 @@ class BasePower:
         self._mass = mass
         factor = self._figures.tool
         self._tool = dict.fromkeys(self._controller, factor * always)
-        for level in (Mode.STAND_ON_MOTORS, Mode.STAND_ON_BRAKES):
+        for level in DRIVES_ON & self._tool.keys():
             self._tool[level] += factor * drive_bus
         self._watts = {
             level: watts + self._tool[level] for level, watts in self._controller.items()
