@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from ir_cli.errors import DemonstrationError, ProcessError
+from ir_cli.errors import CommandError, DemonstrationError
 from ir_cli.output import Progress
 from ir_cli.ros.demo import LONGEST_PAUSE, Demonstration, finish_recording, recorded
 from ir_cli.ros.robots_demo import driven_together
@@ -101,9 +101,9 @@ def test_a_recorder_that_has_died_is_named_at_once() -> None:
     recorder = WaitingRecorder()
 
     def dead(only: str) -> None:
-        raise ProcessError("ir_recorder was killed")
+        raise CommandError("ir_recorder was killed")
 
-    with pytest.raises(ProcessError, match="ir_recorder was killed"):
+    with pytest.raises(CommandError, match="ir_recorder was killed"):
         finish_recording(recorder, SimpleNamespace(check=dead))
     assert not recorder.let.is_set()  # it was not waited for
     recorder.let.set()

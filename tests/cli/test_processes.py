@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from ir_cli.errors import ProcessError
+from ir_cli.errors import CommandError
 from ir_cli.ros.processes import NodeCommand, NodeProcesses
 
 
@@ -47,7 +47,7 @@ def test_a_node_that_dies_is_named_with_the_end_of_its_output(tmp_path: Path) ->
     with NodeProcesses(tmp_path / "log", environment) as nodes:
         nodes.start([NodeCommand("dying")])
         wait_for(tmp_path / "log" / "dying.log", "no robot here")
-        with pytest.raises(ProcessError, match=r"dying ended with exit code 1:\n  no robot here"):
+        with pytest.raises(CommandError, match=r"dying ended with exit code 1:\n  no robot here"):
             check_until_it_raises(nodes)
 
 
@@ -55,7 +55,7 @@ def test_a_node_that_is_killed_is_named_with_the_signal(tmp_path: Path) -> None:
     environment = write_module(tmp_path, "killed", "import os\nos.kill(os.getpid(), 9)\n")
     with NodeProcesses(tmp_path / "log", environment) as nodes:
         nodes.start([NodeCommand("killed")])
-        with pytest.raises(ProcessError, match=r"^killed was ended by SIGKILL$"):
+        with pytest.raises(CommandError, match=r"^killed was ended by SIGKILL$"):
             check_until_it_raises(nodes)
 
 

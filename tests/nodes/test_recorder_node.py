@@ -29,7 +29,7 @@ from ir_msgs.msg import PowerState
 from ir_msgs.srv import GetCell, StartRecording, StopRecording
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.status import StatusCode
-from ir_recorder.errors import PathError, ReadError, WriteError
+from ir_recorder.errors import ReadError, RecorderError, WriteError
 from ir_recorder.node.recorder import COMMAND_NODE, POLL_PERIOD, RecorderNode
 from ir_recorder.reading.mcap_file import read_raw
 from ir_recorder.recording.settings import RecorderSettings
@@ -388,7 +388,7 @@ def test_the_planners_cell_is_attached(
 def test_an_unknown_cell_is_refused_before_a_file_is_made(
     recorder: RecorderNode, tmp_path: Path
 ) -> None:
-    with pytest.raises(PathError, match="nowhere"):
+    with pytest.raises(RecorderError, match="nowhere"):
         recorder.start(str(tmp_path / "d.mcap"), cell="nowhere")
     assert not (tmp_path / "d.mcap").exists()
 

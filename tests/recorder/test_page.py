@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from ir_recorder import PathError, RecorderError, analyse, findings, read_recording
+from ir_recorder import RecorderError, analyse, findings, read_recording
 from ir_recorder.report import report_html, write_report
 from ir_recorder.report.number_text import text
 from ir_recorder.report.picture import write_picture
@@ -84,7 +84,7 @@ def test_an_empty_recording_still_gives_a_page(demo_file: Path, data_of: Any) ->
 
 def test_places_that_cannot_be_written_are_named(demo_file: Path) -> None:
     analysis = analyse(read_recording(demo_file))
-    with pytest.raises(PathError, match="can't be written"):
+    with pytest.raises(RecorderError, match="can't be written"):
         write_report(analysis, (), "/proc/report.html")
     with pytest.raises(RecorderError, match="can't be written"):
         write_picture(analysis, "/proc/picture.png")

@@ -31,7 +31,15 @@ KNOWS = {
     "__init__": READING | {"analysis"},
 }
 FACE = {
-    *("Analysis", "Finding", "PathError", "ReadError", "RecorderError", "Recording", "SchemaError"),
+    *(
+        "Analysis",
+        "Finding",
+        "RecorderError",
+        "ReadError",
+        "RecorderError",
+        "Recording",
+        "SchemaError",
+    ),
     *("Tolerances", "Verdict", "WriteError", "analyse", "findings", "read_recording", "summary"),
 }
 ROOMS = [path.parent.name for path in sorted(FOLDER.glob("*/__init__.py"))]

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from ir_recorder.errors import PathError, RecorderError
+from ir_recorder.errors import RecorderError
 from ir_recorder.format.contents import Split, is_further_part, part_path
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.reading.mcap_file import RawRecording, read_raw
@@ -120,6 +120,6 @@ def test_files_that_are_too_small_or_would_meet_others_are_refused(tmp_path: Pat
         with pytest.raises(RecorderError, match="must be 0 or at least 1"):
             Split(duration=wrong)
     (tmp_path / "a_1.mcap").touch()
-    with pytest.raises(PathError, match=r"a_1\.mcap is there already"):
+    with pytest.raises(RecorderError, match=r"a_1\.mcap is there already"):
         check_free(tmp_path / "a.mcap", Split(duration=2.0))
     check_free(tmp_path / "a.mcap", Split())

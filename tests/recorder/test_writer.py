@@ -19,7 +19,7 @@ from rclpy.serialization import serialize_message
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
 
-from ir_recorder.errors import PathError, WriteError
+from ir_recorder.errors import RecorderError, WriteError
 from ir_recorder.format.schemas import SchemaLibrary
 from ir_recorder.reading.mcap_file import read_raw
 from ir_recorder.recording.writer import RecordingWriter, messages_on_disk
@@ -106,7 +106,7 @@ def test_times_never_run_back_but_for_a_clock_that_was_set_back(tmp_path: Path) 
 def test_an_existing_recording_is_kept_unless_it_may_be_replaced(tmp_path: Path) -> None:
     path = RecordingWriter(tmp_path / "mine.mcap").finish().path
     before = path.read_bytes()
-    with pytest.raises(PathError, match="is there already"):
+    with pytest.raises(RecorderError, match="is there already"):
         RecordingWriter(path)
     assert path.read_bytes() == before
     RecordingWriter(path, overwrite=True).finish()
@@ -116,7 +116,7 @@ def test_an_existing_recording_is_kept_unless_it_may_be_replaced(tmp_path: Path)
 def test_overwrite_never_touches_what_is_no_recording(tmp_path: Path) -> None:
     path = tmp_path / "notes.mcap"
     path.write_text("my only copy")
-    with pytest.raises(PathError, match="file of another kind: it is not replaced"):
+    with pytest.raises(RecorderError, match="file of another kind: it is not replaced"):
         RecordingWriter(path, overwrite=True)
     assert path.read_text() == "my only copy"
 
@@ -133,7 +133,7 @@ def test_a_recording_stays_below_its_roots(tmp_path: Path) -> None:
         inside / ".." / "outside" / "a.mcap",
         inside / "link" / "a.mcap",
     ):
-        with pytest.raises(PathError, match="lies outside of the folders"):
+        with pytest.raises(RecorderError, match="lies outside of the folders"):
             RecordingWriter(path, roots=roots)
     assert list(outside.iterdir()) == []
     RecordingWriter(inside / "a.mcap", roots=roots).finish()
@@ -141,7 +141,7 @@ def test_a_recording_stays_below_its_roots(tmp_path: Path) -> None:
 
 def test_a_fifo_is_refused_at_once(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.mcap")
-    with pytest.raises(PathError, match="not a regular file"):
+    with pytest.raises(RecorderError, match="not a regular file"):
         RecordingWriter(tmp_path / "pipe.mcap", overwrite=True)
 
 
@@ -159,7 +159,7 @@ def test_a_fifo_is_refused_at_once(tmp_path: Path) -> None:
     ],
 )
 def test_paths_that_cannot_become_recordings_are_refused(name: str, sentence: str) -> None:
-    with pytest.raises(PathError, match=sentence):
+    with pytest.raises(RecorderError, match=sentence):
         RecordingWriter(name)
 
 
@@ -198,12 +198,12 @@ def test_a_full_disk_leaves_the_recording_that_was_to_be_replaced(
 
 SECOND = """
 import sys
-from ir_recorder.errors import PathError
+from ir_recorder.errors import RecorderError
 from ir_recorder.recording import RecordingWriter
 for path in sys.argv[1:]:
     try:
         RecordingWriter(path, overwrite=True)
-    except PathError as error:
+    except RecorderError as error:
         print(error)
 """
 
@@ -231,7 +231,7 @@ def test_a_second_writer_of_a_file_is_refused_by_whatever_name(tmp_path: Path) -
         writers.append(RecordingWriter(path, overwrite=kind == "replaced"))
         others += names_of(path)
     for other in others:
-        with pytest.raises(PathError, match="is being written by another recorder"):
+        with pytest.raises(RecorderError, match="is being written by another recorder"):
             RecordingWriter(other, overwrite=True)
     words = [sys.executable, "-c", SECOND, *map(str, others)]
     refused = subprocess.run(words, capture_output=True, text=True, check=True).stdout.splitlines()
@@ -268,7 +268,7 @@ def test_of_a_pair_of_writers_one_is_refused_and_nothing_is_lost(
             start.wait()
             try:
                 writer = RecordingWriter(path, schemas, overwrite=True)
-            except PathError:
+            except RecorderError:
                 done.append(-1)
                 start.wait()
                 return

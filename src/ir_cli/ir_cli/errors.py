@@ -1,9 +1,10 @@
 """Errors of the command line, and sentences for unknown names.
 
-CommandError
-├── InputError          what was typed makes no sense: exit code 2
-├── ProcessError        a node could not be started, or died
-└── DemonstrationError  a step of the demonstration failed
+::
+
+    CommandError
+    ├── InputError          what was typed makes no sense: exit code 2
+    └── DemonstrationError  a step of the demonstration failed
 """
 
 from __future__ import annotations
@@ -22,10 +23,6 @@ class InputError(CommandError):
     """What was typed, or the file that was named, makes no sense."""
 
     exit_code = 2
-
-
-class ProcessError(CommandError):
-    """A node could not be started, or died."""
 
 
 class DemonstrationError(CommandError):

@@ -6,7 +6,7 @@
 What the motions mean for a robot among machines is `ir_planner.krl`'s.
 """
 
-from ir_krl.errors import KrlError, KrlMotionError, KrlRunError, KrlSyntaxError, Place
+from ir_krl.errors import KrlError, KrlMotionError, KrlRunError, Place
 from ir_krl.language import Source, parse
 from ir_krl.project import ARCHIVES, BYTES_MAX, File, Project, read_project, text_of
 from ir_krl.run import (
@@ -94,7 +94,6 @@ __all__ = [
     "KrlError",
     "KrlMotionError",
     "KrlRunError",
-    "KrlSyntaxError",
     "Motion",
     "Note",
     "Numbers",

@@ -20,16 +20,15 @@ class Place:
 
 
 class KrlError(Exception):
-    """A program that can't be read, run or written: `place` and a sentence."""
+    """A program that can't be read, run or written: `place` and a sentence.
+
+    Raised itself for a text that is no KRL, or a construct of KRL that isn't read here.
+    """
 
     def __init__(self, message: str, place: Place | None = None) -> None:
         self.place = place or Place()
         self.reason = message
         super().__init__(f"{self.place}: {message}" if str(self.place) else message)
-
-
-class KrlSyntaxError(KrlError):
-    """A text that is no KRL, or a construct of KRL that isn't read here."""
 
 
 class KrlRunError(KrlError):

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
-from ir_krl.errors import KrlError, KrlSyntaxError, Place
+from ir_krl.errors import KrlError, Place
 from ir_krl.language import Routine, Source, Tree, parse
 from ir_krl.run.library import CONTROLLERS
 from ir_krl.run.notes import Effect, Note
@@ -45,18 +45,16 @@ class File:
 
     @property
     def text(self) -> str:
-        """What it says. Raises KrlSyntaxError for a file of another encoding or size."""
+        """What it says. Raises KrlError for a file of another encoding or size."""
         return text_of(self.content, str(self.path))
 
 
 def text_of(content: bytes, name: str) -> str:
-    """The text of a file, which `name` names. Raises KrlSyntaxError."""
+    """The text of a file, which `name` names. Raises KrlError."""
     if len(content) > BYTES_MAX:
-        raise KrlSyntaxError(
-            f"{len(content)} bytes: at most {BYTES_MAX} are read, split it", Place(name)
-        )
+        raise KrlError(f"{len(content)} bytes: at most {BYTES_MAX} are read, split it", Place(name))
     if content.startswith(_UTF16):
-        raise KrlSyntaxError(
+        raise KrlError(
             "the file is UTF-16 text, must be UTF-8: save it with that encoding", Place(name, 1, 1)
         )
     return content.decode("utf-8", errors="replace")

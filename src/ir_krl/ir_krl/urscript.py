@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ir_description.poses import abc_from_rotation, pose_of
-from ir_krl.errors import KrlError, KrlRunError, KrlSyntaxError, Place
+from ir_krl.errors import KrlError, KrlRunError, Place
 from ir_krl.run.commands import (
     END_OF_LAST,
     Blend,
@@ -157,7 +157,7 @@ class _Script:
                 continue
             if waiting and text != "end":
                 if text != "sync()":
-                    raise KrlSyntaxError("a while loop may only sync(): others aren't read", place)
+                    raise KrlError("a while loop may only sync(): others aren't read", place)
                 continue
             if match := _WAIT.fullmatch(text):
                 until = bool(match[1]) or match[3] == "False"
@@ -180,13 +180,13 @@ class _Script:
             self._values[match[1]] = self._value(self._parsed(match[2], place), place)
             return
         if re.match(r"(if|elif|else|while|thread|def|return|run|kill)\b", text):
-            raise KrlSyntaxError(
+            raise KrlError(
                 f"{text.split()[0].rstrip(':')} isn't read: give the straight sequence of moves",
                 place,
             )
         call = self._parsed(text, place)
         if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Name):
-            raise KrlSyntaxError(f"{text[:40]!r} is no statement that is read", place)
+            raise KrlError(f"{text[:40]!r} is no statement that is read", place)
         name = call.func.id
         if name in self._calls:
             self._calls[name](call, place)
@@ -196,7 +196,7 @@ class _Script:
             text, effect = _NOTED[name]
             self._notes.append(Note(place, f"{name} {text}", effect))
         elif re.match(r"(move|servo|speed|force|path|conveyor)", name):
-            raise KrlSyntaxError(f"{name} may move the robot and isn't read", place)
+            raise KrlError(f"{name} may move the robot and isn't read", place)
         else:
             self._notes.append(
                 Note(place, f"{name} isn't known: no motion assumed", Effect.MOTIONS)
@@ -206,7 +206,7 @@ class _Script:
         try:
             return ast.parse(text, mode="eval").body
         except (SyntaxError, ValueError, RecursionError):
-            raise KrlSyntaxError(f"{text[:40]!r} isn't URScript", place) from None
+            raise KrlError(f"{text[:40]!r} isn't URScript", place) from None
 
     def _value(self, node: ast.expr, place: Place) -> object:  # noqa: PLR0911
         match node:

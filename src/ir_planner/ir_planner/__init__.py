@@ -18,7 +18,6 @@ from ir_planner.errors import (
     PlannerError,
     RequestError,
     TimingError,
-    UnknownNameError,
 )
 from ir_planner.flexible import SteadyPlan
 from ir_planner.planner import Planner
@@ -53,7 +52,6 @@ __all__ = [
     "SteadyPlan",
     "StoredProgram",
     "TimingError",
-    "UnknownNameError",
     "parse_goal",
     "what_if",
 ]

@@ -17,7 +17,7 @@ from ir_msgs_py.announcements import DATA, DRIVER, CarriedLoad, ControllerTimers
 from ir_msgs_py.modes import TransitionTimes
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
-from ir_planner.errors import RequestError, UnknownNameError
+from ir_planner.errors import RequestError, unknown_name
 from ir_planner.program import Doors
 from ir_planner.scene import Drives, PlanningScene, load_text, scene_with
 from ir_values.arrays import FloatArray
@@ -147,9 +147,7 @@ class CurrentCell:
         with self._changing:
             cell = self.cell
             if name not in [machine.name for machine in cell.equipment]:
-                raise UnknownNameError(
-                    "equipment", name, (machine.name for machine in cell.equipment)
-                )
+                raise unknown_name("equipment", name, (machine.name for machine in cell.equipment))
             return self._replaced_by(cell.with_equipment(name, pose, enabled, state or None))
 
     def hash_of(self, cell: Cell) -> str:

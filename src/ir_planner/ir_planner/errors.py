@@ -1,10 +1,11 @@
 """Errors of the planner, as one tree.
 
-PlannerError
-├── RequestError         a request that makes no sense: status code and a sentence with value, bound
-and unit │   └── UnknownNameError a name that nobody has; the sentence lists the known ones
-├── TimingError          no time law exists: a joint's torque does not carry the arm along this path
-└── CancelledError       the caller asked to stop
+::
+
+    PlannerError
+    ├── RequestError    a request that makes no sense; status code, sentence with value, bound, unit
+    ├── TimingError     no time law exists: a torque does not carry the arm along this path
+    └── CancelledError  the caller asked to stop
 
 A plan that was looked for and not found is no error: it is a result with a status.
 """
@@ -36,15 +37,13 @@ def unfit(sentence: str) -> RequestError:
     return RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, sentence)
 
 
-class UnknownNameError(RequestError):
-    """A name that is not known."""
-
-    def __init__(self, what: str, name: str, known: Iterable[str]) -> None:
-        shown = ascii(name) if len(name) <= 60 else ascii(name[:57]) + "..."
-        listed = ", ".join(known) or "none"
-        super().__init__(
-            StatusCode.INVALID_OBJECT_NAME, f"{what} {shown} is unknown: known are {listed}"
-        )
+def unknown_name(what: str, name: str, known: Iterable[str]) -> RequestError:
+    """A name that is not known; the sentence lists the known ones."""
+    shown = ascii(name) if len(name) <= 60 else ascii(name[:57]) + "..."
+    listed = ", ".join(known) or "none"
+    return RequestError(
+        StatusCode.INVALID_OBJECT_NAME, f"{what} {shown} is unknown: known are {listed}"
+    )
 
 
 class TimingError(PlannerError):

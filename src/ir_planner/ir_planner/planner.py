@@ -41,7 +41,7 @@ from ir_planner.configurations import (
     configurations_at,
 )
 from ir_planner.current_cell import CurrentCell, DriverReports, ReadCell, read_cell_here
-from ir_planner.errors import RequestError, UnknownNameError, unfit
+from ir_planner.errors import RequestError, unfit, unknown_name
 from ir_planner.flexible import SteadyPlan, plan_steady_cycle
 from ir_planner.program import (
     PauseLengths,
@@ -144,7 +144,7 @@ def options_with(options: PlanOptions | None, changes: OptionFields) -> PlanOpti
     known = [field.name for field in fields(PlanOptions)]
     for name in changes:
         if name not in known:
-            raise UnknownNameError("option", name, known)
+            raise unknown_name("option", name, known)
     try:
         return PlanOptions(**changes) if options is None else replace(options, **changes)
     except InvalidValueError as error:

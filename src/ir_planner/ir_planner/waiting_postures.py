@@ -9,7 +9,7 @@ from ir_msgs_py.modes import TransitionTimes
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.errors import RequestError, UnknownNameError
+from ir_planner.errors import RequestError, unknown_name
 from ir_planner.program import PauseLengths, Standby, Trip, best_posture, lengths_of
 from ir_planner.regional import MovementPlan
 from ir_planner.request import POSTURES, Goal, parse_goal
@@ -40,7 +40,7 @@ def trips_to(postures: Sequence[str], here: FloatArray, cell: Cell, plan: Plan) 
     """Trips from here (n,) to named postures and stations and back. plan: a movement from a start
     to a goal.
 
-    Raises RequestError for too many, UnknownNameError for one that the cell doesn't name.
+    Raises RequestError for too many, and for one that the cell does not name.
     """
     if len(postures) > POSTURES_MAX:
         raise RequestError(
@@ -50,7 +50,7 @@ def trips_to(postures: Sequence[str], here: FloatArray, cell: Cell, plan: Plan) 
     known = (*(station.name for station in cell.stations), *POSTURES)
     for name in postures:
         if name not in known:
-            raise UnknownNameError("posture", name, known)
+            raise unknown_name("posture", name, known)
     return tuple(_trip(name, here, cell, plan) for name in postures)
 
 

@@ -23,7 +23,7 @@ from ir_description import Cell, InvalidValueError, Load, cell_from_yaml, cell_t
 from ir_kernels import portable
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
-from ir_planner.errors import RequestError, UnknownNameError, unfit
+from ir_planner.errors import RequestError, unfit, unknown_name
 from ir_planner.planner import Planner
 from ir_values.argument_types import typed
 from ir_values.arrays import FloatArray
@@ -122,7 +122,7 @@ def _changed(cell: Cell, name: str, value: float, *, look: bool = False) -> Cell
         return _with_mass(cell, thing, value, look)
     if what not in AXES:
         known = (CYCLE_TIME, *OPTIONS, "mass NAME", *(f"{axis} NAME" for axis in AXES))
-        raise UnknownNameError("value", name, known)
+        raise unknown_name("value", name, known)
     return _moved(cell, thing, value * np.eye(3)[AXES.index(what)])
 
 
@@ -130,7 +130,7 @@ def _with_mass(cell: Cell, name: str, mass: float, look: bool) -> Cell:
     """The cell with another mass [kg] of tool or part; its inertia in proportion."""
     loads = [part.name for part in cell.parts] + ([cell.tool.name] if cell.tool else [])
     if name not in loads:
-        raise UnknownNameError("tool or part", name, loads)
+        raise unknown_name("tool or part", name, loads)
     if look:
         return cell
 
@@ -158,7 +158,7 @@ def _moved(cell: Cell, name: str, by: FloatArray) -> Cell:
         *(machine.name for machine in cell.equipment),
         *(station.name for station in cell.stations),
     ]
-    raise UnknownNameError("machine or station", name, known)
+    raise unknown_name("machine or station", name, known)
 
 
 def _apart(job: tuple[str, PlanOptions, tuple[str, ...]], share: Sequence[Change]) -> list[Row]:

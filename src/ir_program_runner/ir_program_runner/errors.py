@@ -1,9 +1,11 @@
 """Errors of a program that runs, as one tree.
 
-RunnerError
-├── ProgramError         a program that must not be started; carries its status code
-├── StepFailedError      a step that went wrong while it ran; carries its status
-└── CanceledError        thrown into a running program: stop, and leave no bit behind
+::
+
+    RunnerError
+    ├── ProgramError         a program that must not be started; carries its status code
+    ├── StepFailedError      a step that went wrong while it ran; carries its status
+    └── CanceledError        thrown into a running program: stop, and leave no bit behind
 """
 
 from __future__ import annotations

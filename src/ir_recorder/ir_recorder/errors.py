@@ -2,8 +2,7 @@
 
 ::
 
-    RecorderError
-    ├── PathError        the file asked for can't be written there, or is taken
+    RecorderError            itself: a file can't be written there, or is taken
     ├── WriteError       the disk refused while recording: full, read-only
     │   └── LostFileError    the file was deleted or replaced, its disk unmounted
     ├── SchemaError      no definition of a message type is installed
@@ -13,10 +12,6 @@
 
 class RecorderError(Exception):
     """Root of what this package raises; the sentence says what is refused, and why."""
-
-
-class PathError(RecorderError):
-    """A path that can't become a recording; the sentence says why."""
 
 
 class WriteError(RecorderError):

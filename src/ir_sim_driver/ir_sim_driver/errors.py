@@ -1,12 +1,14 @@
 """Errors of the driver, as one tree.
 
-DriverError
-├── SettingsError (ValueError)        a setting out of its range
-├── TrajectoryRefusedError            not executed; code of control_msgs/FollowJointTrajectory
-├── RequestRefusedError               a request that cannot be met; code of
-more: the process ends ├── LinkError                         a link to the PLC that cannot be opened
-├── ModbusRefusedError                a request that an exception code of Modbus answers
-└── BackendError                      the physics gave up: not installed, disconnected or diverged
+::
+
+    DriverError
+    ├── SettingsError (ValueError)  a setting out of its range
+    ├── TrajectoryRefusedError      not executed; code of control_msgs/FollowJointTrajectory
+    ├── RequestRefusedError         a request that cannot be met; a status code
+    ├── LinkError                   a link to the PLC that cannot be opened: the process ends
+    ├── ModbusRefusedError          a request that an exception code of Modbus answers
+    └── BackendError                the physics gave up: not installed, disconnected or diverged
 """
 
 from __future__ import annotations

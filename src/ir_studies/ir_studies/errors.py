@@ -1,11 +1,13 @@
 """Errors of studies, as one tree.
 
-StudyError
-├── SettingsError  a settings file makes no sense: the key, its value, and what it may be
-├── FolderError    the folder of the results holds others, or is in use
-├── WorkerError    the processes that plan can't be started, or Dask is missing or not reached
-├── DrivingError   the simulated robot did not drive what was planned
-└── StoppedError   somebody asked to stop; what was made is kept
+::
+
+    StudyError
+    ├── SettingsError  a settings file makes no sense: the key, its value, and what it may be
+    ├── FolderError    the folder of the results holds others, or is in use
+    ├── WorkerError    the processes that plan can't be started, or Dask is missing or not reached
+    ├── DrivingError   the simulated robot did not drive what was planned
+    └── StoppedError   somebody asked to stop; what was made is kept
 """
 
 

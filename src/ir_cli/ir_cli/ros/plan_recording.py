@@ -57,7 +57,7 @@ def write_plan(
     """Write the plan of a program, with its request, the planner's cell and its settings, as a
     recording.
 
-    PathError or WriteError where that can't be.
+    RecorderError or WriteError where that can't be.
     """
     writer = RecordingWriter(path, overwrite=overwrite, roots=roots or ANYWHERE)
     now = time.time_ns()

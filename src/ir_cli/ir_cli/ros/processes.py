@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 
-from ir_cli.errors import ProcessError
+from ir_cli.errors import CommandError
 
 STOP_SECONDS = 30.0
 """How long a node may take to end after SIGINT before it is killed; on a busy machine four end at
@@ -112,7 +112,7 @@ class NodeProcesses:
         return {name: process.pid for name, process in self._running.items()}
 
     def check(self, only: str = "") -> None:
-        """Raise ProcessError when a node, or the only one that counts, has ended on its own, with
+        """Raise CommandError when a node, or the only one that counts, has ended on its own, with
         the end of what it printed.
         """
         for name, process in self._running.items():
@@ -122,13 +122,13 @@ class NodeProcesses:
             if code is not None:
                 last = self._log(name).read_text(errors="replace").splitlines()[-12:]
                 colon = ":" if last else ""
-                raise ProcessError("\n  ".join([f"{name} {ending(code)}{colon}", *last]))
+                raise CommandError("\n  ".join([f"{name} {ending(code)}{colon}", *last]))
 
     def end(self) -> None:
-        """Stop all nodes; raise ProcessError when one of them did not end well."""
+        """Stop all nodes; raise CommandError when one of them did not end well."""
         bad = [f"{name} {ending(code)}" for name, code in self.stop().items() if code != 0]
         if bad:
-            raise ProcessError(f"{'; '.join(bad)}; their output is in {self._log_folder}")
+            raise CommandError(f"{'; '.join(bad)}; their output is in {self._log_folder}")
 
     def stop(self) -> dict[str, int]:
         """Interrupt all nodes, wait for them, kill what does not end; return the exit codes."""

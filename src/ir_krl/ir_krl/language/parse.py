@@ -18,7 +18,7 @@ from lark import Lark, Token
 from lark import Tree as ParseTree
 from lark.exceptions import UnexpectedCharacters, UnexpectedInput
 
-from ir_krl.errors import KrlSyntaxError, Place
+from ir_krl.errors import KrlError, Place
 
 TEXT_MAX = 4_000_000
 """Characters of one file that are read: a program of this size has some 100,000 lines."""
@@ -137,22 +137,20 @@ class Source:
 def parse(text: str, file: str) -> Source:
     """Read the text of a .src or .dat file; `file` is the name that complaints carry.
 
-    Raises KrlSyntaxError with line and column.
+    Raises KrlError with line and column.
     """
     if len(text) > TEXT_MAX:
-        raise KrlSyntaxError(f"{len(text)} characters: at most {TEXT_MAX} are read", Place(file))
+        raise KrlError(f"{len(text)} characters: at most {TEXT_MAX} are read", Place(file))
     text = (
         text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     )  # as editors leave them
     try:
         units = _tree(_parser().parse(_prepared(text) + "\n")).children
     except RecursionError:
-        raise KrlSyntaxError(
-            "brackets, signs or blocks are nested too deeply", Place(file)
-        ) from None
+        raise KrlError("brackets, signs or blocks are nested too deeply", Place(file)) from None
     except UnexpectedInput as error:
         sentence, column = _complaint(error, text)
-        raise KrlSyntaxError(sentence, Place(file, error.line, column)) from None
+        raise KrlError(sentence, Place(file, error.line, column)) from None
     routines = [_routine(unit, file) for unit in units if unit.data in ("routine", "function")]
     data = tuple(unit.children[-1] for unit in units if unit.data == "data_list")
     versions = frozenset(

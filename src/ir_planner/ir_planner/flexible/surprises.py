@@ -14,7 +14,7 @@ from ir_description import Cell
 from ir_msgs_py.modes import modes_of
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import StatusCode
-from ir_planner.errors import RequestError, UnknownNameError
+from ir_planner.errors import RequestError, unknown_name
 from ir_planner.flexible.steady_plan import SteadyPlan
 from ir_planner.flexible.tending_cell import done_of, machines_of, route_of, start_of
 from ir_planner.program import Rests, Scenes, Steps, Timeouts, rests_at
@@ -214,11 +214,11 @@ def outage_replay(
 ) -> OutageReplay:
     """A machine takes so many seconds more for its part of that number, from 0, once. lengths (n,)
     [s]: as long as an outage may be, equally likely; how long this one is nobody knows. Raises
-    UnknownNameError for a machine without a process.
+    RequestError for a machine without a process.
     """
     replay = Replay(plan)
     if machine not in replay.machines:
-        raise UnknownNameError("machine with a process", machine, replay.machines)
+        raise unknown_name("machine with a process", machine, replay.machines)
     times = replay.planned_times()
     planned = replay.follow(times)
     times[machine][part] += seconds

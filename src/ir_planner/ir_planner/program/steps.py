@@ -13,11 +13,11 @@ from ir_description import (
     Signal,
     StepKind,
     ToolTilt,
+    UnknownNameError,
     cell_in,
 )
-from ir_description import UnknownNameError as DescriptionNameError
 from ir_msgs_py.status import Status, StatusCode
-from ir_planner.errors import RequestError, UnknownNameError
+from ir_planner.errors import RequestError, unknown_name
 from ir_planner.request import POSTURES, one_tilt
 from ir_planner.scene import Drives, PlanningScene, with_parts
 
@@ -183,7 +183,7 @@ class Scenes:
 def steps_of(cell: Cell, stations: tuple[str, ...]) -> tuple[ProgramStep, ...]:
     """The cell's program, or a visit of each of `stations` (stations, postures, paths) in turn.
 
-    Raises UnknownNameError for a stop nobody has, RequestError where there is nothing to plan.
+    Raises RequestError for an unknown stop, and where there is nothing to plan.
     """
     if not stations:
         if not cell.program:
@@ -202,7 +202,7 @@ def steps_of(cell: Cell, stations: tuple[str, ...]) -> tuple[ProgramStep, ...]:
     kinds |= dict.fromkeys((station.name for station in cell.stations), "STATION")
     for name in stations:
         if name not in kinds:
-            raise UnknownNameError("station", name, kinds)
+            raise unknown_name("station", name, kinds)
     return tuple(ProgramStep(kinds[name], name) for name in stations)
 
 
@@ -216,7 +216,7 @@ def placed_steps(
     for k, (step, doors) in enumerate(zip(steps, doors_along(cell, steps, begin), strict=True), 1):
         try:
             after = places.after(step)
-        except (InvalidValueError, DescriptionNameError) as error:
+        except (InvalidValueError, UnknownNameError) as error:
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS, f"step {k} of the program: {error}"
             ) from error

@@ -15,7 +15,7 @@ from ir_description import LIMIT_TOLERANCE, OUTSIDE_MAX, Cell
 from ir_description.poses import rotation_from_abc
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory, Samples
-from ir_planner.errors import RequestError, UnknownNameError, unfit
+from ir_planner.errors import RequestError, unfit, unknown_name
 from ir_values.argument_types import typed, typed_methods
 from ir_values.arrays import FloatArray
 
@@ -92,7 +92,7 @@ def parse_goal(text: str, cell: Cell, what: str = "goal") -> Goal:
     if len(words) > 1 and keys[0] in _POSE_KEYS:
         return Goal(pose=_pose(_numbers(keys, words[1::2], list(_POSE_KEYS), "")), text=stripped)
     texts = ('"A1 0 A2 -90 ..." in degrees', '"X 1.8 Y 0 Z 1.2 A 0 B 90 C 0"')
-    raise UnknownNameError(what, stripped, [*(s.name for s in cell.stations), *POSTURES, *texts])
+    raise unknown_name(what, stripped, [*(s.name for s in cell.stations), *POSTURES, *texts])
 
 
 def joints_of(text: str, cell: Cell) -> FloatArray | None:

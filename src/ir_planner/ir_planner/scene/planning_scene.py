@@ -35,7 +35,7 @@ from ir_kernels import (
 from ir_kernels.power import Regeneration
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
-from ir_planner.errors import RequestError, UnknownNameError
+from ir_planner.errors import RequestError, unknown_name
 from ir_planner.scene.actuators import LinkVoltage, within_current_and_voltage
 from ir_planner.scene.motion_limits import MotionLimits
 from ir_planner.scene.tool_bounds import ToolBounds
@@ -362,7 +362,7 @@ class PlanningScene:
             known = [stop.name for stop in self.cell.stations] + [
                 path.name for path in self.cell.paths
             ]
-            raise UnknownNameError("station", station, known) from None
+            raise unknown_name("station", station, known) from None
 
     def zone_of(self, station: str) -> Zone | None:
         """The forbidden zone of the machine of a station or a path, in the world; None: it has
@@ -371,11 +371,11 @@ class PlanningScene:
         return self.cell.zone_at(station)
 
     def station(self, name: str) -> Station:
-        """The station of that name; UnknownNameError lists the known."""
+        """The station of that name; RequestError lists the known."""
         for station in self.cell.stations:
             if station.name == name:
                 return station
-        raise UnknownNameError("station", name, (station.name for station in self.cell.stations))
+        raise unknown_name("station", name, (station.name for station in self.cell.stations))
 
 
 def with_parts(cell: Cell, parts: PartPlaces) -> Cell:
@@ -389,7 +389,7 @@ def scene_with(
 ) -> PlanningScene:
     """Scene in which `load` ("gripper+part", "none") is attached; a part that is held lies nowhere.
 
-    Raises UnknownNameError (the known loads) or RequestError (two parts at once).
+    Raises RequestError for an unknown load (it lists the known) or two parts at once.
     """
     if load in [one.name for one in cell.whole_loads]:
         return PlanningScene(cell, (cell.whole_load(load),), power, drives or Drives())
@@ -414,7 +414,7 @@ def _check_load(cell: Cell, names: Iterable[str], held: list[str]) -> None:
     names = list(names)
     for name in names:
         if name not in known:
-            raise UnknownNameError("load", name, [*known, NO_LOAD])
+            raise unknown_name("load", name, [*known, NO_LOAD])
     if len(held) > 1 or len(set(names)) < len(names):
         listed = LOAD_SEPARATOR.join(names)
         raise RequestError(

@@ -25,7 +25,6 @@ from ir_msgs_py.status import Status, StatusCode
 from ir_recorder.arguments import record_parser, roots_of
 from ir_recorder.errors import (
     LostFileError,
-    PathError,
     RecorderError,
     SchemaError,
     WriteError,
@@ -275,7 +274,9 @@ class RecorderNode(Node):
         RecorderError when it can't.
         """
         if self._recording is not None:
-            raise PathError(f"already recording into {self._recording.session.path}; stop first")
+            raise RecorderError(
+                f"already recording into {self._recording.session.path}; stop first"
+            )
         wanted = checked_topics(topics) or self._settings.wanted_topics
         name = cell or self._settings.cell
         files = files_of_cell(name) if name else ()

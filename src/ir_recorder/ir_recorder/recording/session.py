@@ -18,7 +18,7 @@ from ir_description import (
     robot_in,
     robot_urdf,
 )
-from ir_recorder.errors import LostFileError, PathError
+from ir_recorder.errors import LostFileError, RecorderError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import Split, part_facts, part_path
 from ir_recorder.format.qos import QosOffer
@@ -31,21 +31,21 @@ from ir_values.extensions import installed_extensions
 
 
 def check_free(path: str | Path, split: Split) -> None:
-    """PathError where the second file of a recording would meet another one."""
+    """RecorderError where the second file of a recording would meet another one."""
     second = part_path(checked_path(path), 1)
     if split.wanted and second.exists():
-        raise PathError(f"{second} is there already; choose another path or set overwrite")
+        raise RecorderError(f"{second} is there already; choose another path or set overwrite")
 
 
 def continued_path(lost: Path) -> Path:
-    """The file in which a recording goes on that lost its own: shift_continued.mcap; PathError
+    """The file in which a recording goes on that lost its own: shift_continued.mcap; RecorderError
     where there are too many.
     """
     for number in range(1, 100):
         name = f"{lost.stem}_continued{'' if number == 1 else f'_{number}'}{lost.suffix}"
         if not lost.with_name(name).exists():
             return lost.with_name(name)
-    raise PathError(f"{lost.with_name(name)} and all before are there already")
+    raise RecorderError(f"{lost.with_name(name)} and all before are there already")
 
 
 class LatchedMessages:
@@ -258,15 +258,16 @@ def installed_version(package: str) -> str:
 
 
 def files_of_cell(name_or_path: str) -> tuple[CellFiles, ...]:
-    """Files of a bundled cell or of one on disk, of each robot where it has several; PathError when
-    there is none or it is broken.
+    """Files of a bundled cell or of one on disk, of each robot where it has several.
+
+    Raises RecorderError when there is none or it is broken.
     """
     try:
         named = robot_in(name_or_path)[1]
         several = None if named else load_robot_cells(name_or_path)
         cells = {"": load_cell(name_or_path)} if several is None else several.by_name
     except DescriptionError as error:
-        raise PathError(f"cell {name_or_path[:200]!r} can't be attached: {error}") from error
+        raise RecorderError(f"cell {name_or_path[:200]!r} can't be attached: {error}") from error
     return tuple(
         CellFiles(
             cell_to_yaml(cell), robot_urdf(cell.robot, cell.tool, cell.tcp, cell.base_pose), robot

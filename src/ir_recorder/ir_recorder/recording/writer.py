@@ -23,7 +23,7 @@ from mcap.exceptions import McapError
 from mcap.reader import make_reader
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
-from ir_recorder.errors import LostFileError, PathError, WriteError
+from ir_recorder.errors import LostFileError, RecorderError, WriteError
 from ir_recorder.format.qos import QosOffer, offers_to_yaml
 from ir_recorder.format.schemas import SchemaLibrary
 from ir_values.errors import FileRefusedError
@@ -53,7 +53,7 @@ class RecordingSummary:
 class RecordingWriter:
     """One MCAP file being written; times are nanoseconds of the node's clock.
 
-    Raises PathError when the file can't be opened and WriteError as soon as the storage refuses;
+    Raises RecorderError when the file can't be opened, WriteError as soon as the storage refuses;
     after a WriteError the writer is closed and further calls raise the same error again.
     """
 
@@ -214,23 +214,23 @@ class _Storage:
 
 
 def checked_path(path: str | Path) -> Path:
-    """An absolute path that may become a recording; PathError names what is wrong with it."""
+    """An absolute path that may become a recording; RecorderError names what is wrong with it."""
     text = str(path)
     if not text.isprintable() or not text:
-        raise PathError(f"path {text[:80]!r}: empty, or with control characters")
+        raise RecorderError(f"path {text[:80]!r}: empty, or with control characters")
     name = Path(text).name
     if len(name.encode()) > _NAME_MAX:
-        raise PathError(
+        raise RecorderError(
             f"the file's name has {len(name.encode())} bytes, at most {_NAME_MAX} are taken"
         )
     if Path(text).suffix != ".mcap":
-        raise PathError(f"path {text[:200]!r} must end in .mcap")
+        raise RecorderError(f"path {text[:200]!r} must end in .mcap")
     if len(text.encode(errors="replace")) > _PATH_MAX:
-        raise PathError(f"the path has more than {_PATH_MAX} bytes")
+        raise RecorderError(f"the path has more than {_PATH_MAX} bytes")
     try:
         return Path(text).expanduser().absolute()
     except RuntimeError as error:  # a user without a home
-        raise PathError(f"path {text[:80]!r}: {error}") from error
+        raise RecorderError(f"path {text[:80]!r}: {error}") from error
 
 
 class _SummedWriter(BufferedWriter):
@@ -248,7 +248,7 @@ class RecordingFile:
     """The file of a recording below `roots`, locked while it grows.
 
     With `overwrite` it may take the place of a recording, never of anything else: it is written
-    beside, and `settle` moves it there. PathError when it can't be opened, or is being written.
+    beside, and `settle` moves it there. RecorderError when it can't be opened, or is being written.
     """
 
     def __init__(self, path: Path, overwrite: bool, roots: FileRoots) -> None:
@@ -258,23 +258,23 @@ class RecordingFile:
         try:
             self._place = roots.inside(path)
             if not self._place.parent.is_dir():
-                raise PathError(
+                raise RecorderError(
                     f"{path} can't be written: there is no directory {path.parent}; make it first"
                 )
             self.stream = _SummedWriter(FileIO(self._opened(path, overwrite), "wb"))
         except FileRefusedError as error:
-            raise PathError(str(error)) from error
+            raise RecorderError(str(error)) from error
         except FileExistsError as error:
-            raise PathError(
+            raise RecorderError(
                 f"{path} is there already; choose another path or set overwrite"
             ) from error
         except BlockingIOError as error:
-            raise PathError(
+            raise RecorderError(
                 f"{path} is being written by another recorder: stop that one, or choose another "
                 "path"
             ) from error
         except OSError as error:
-            raise PathError(f"{path} can't be written: {error.strerror}") from error
+            raise RecorderError(f"{path} can't be written: {error.strerror}") from error
 
     def _opened(self, path: Path, overwrite: bool) -> int:
         """A descriptor of the file to write: a new one at its place, or beside an older one."""

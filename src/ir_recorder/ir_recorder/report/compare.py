@@ -69,7 +69,7 @@ def write_comparison(
     roots: FileRoots = ANYWHERE,
     costs: Costs | None = None,
 ) -> Path:
-    """Writes the page below `roots`; its absolute path. PathError when it can't be written."""
+    """Writes the page below `roots`; its absolute path. RecorderError when it can't be written."""
     return write_output(path, comparison_html(compared, costs).encode(), PAGE_START, roots)
 
 

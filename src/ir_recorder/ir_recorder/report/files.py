@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ir_recorder.errors import PathError
+from ir_recorder.errors import RecorderError
 from ir_values.errors import FileRefusedError
 from ir_values.files import FileRoots
 
@@ -13,14 +13,14 @@ def write_output(path: str | Path, content: bytes, replaces: bytes, roots: FileR
     """Writes a file below `roots` and makes its folder; returns its absolute path.
 
     A file that is there is replaced only where it starts with `replaces`, whole or not at all.
-    PathError when it can't be written.
+    RecorderError when it can't be written.
     """
     target = Path(path).absolute()
     try:
         roots.inside(target).parent.mkdir(parents=True, exist_ok=True)
         roots.write(target, content, replaces)
     except FileRefusedError as error:
-        raise PathError(str(error)) from error
+        raise RecorderError(str(error)) from error
     except OSError as error:
-        raise PathError(f"{target} can't be written: {error.strerror}") from error
+        raise RecorderError(f"{target} can't be written: {error.strerror}") from error
     return target

@@ -374,7 +374,7 @@ def write_fleet(
     costs: Costs | None = None,
     roots: FileRoots = ANYWHERE,
 ) -> Path:
-    """Writes the page below `roots`; its absolute path. PathError when it can't be written."""
+    """Writes the page below `roots`; its absolute path. RecorderError when it can't be written."""
     return write_output(path, fleet_html(members, left_out, costs).encode(), PAGE_START, roots)
 
 

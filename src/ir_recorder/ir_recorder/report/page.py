@@ -92,7 +92,7 @@ def write_report(
     """Writes the page below `roots`, in place of another page but of no other file; its absolute
     path.
 
-    PathError when it can't be written.
+    RecorderError when it can't be written.
     """
     page = report_html(analysis, checks, tolerances, costs, front).encode()
     return write_output(path, page, PAGE_START, roots)

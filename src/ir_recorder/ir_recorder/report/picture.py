@@ -46,8 +46,8 @@ def write_picture(analysis: Analysis, path: str | Path, roots: FileRoots = ANYWH
     """Power with the modes marked, joules per movement, and the tool's path from above, as PNG
     below `roots`.
 
-    Returns the absolute path. RecorderError where matplotlib isn't installed, PathError where the
-    file can't be written.
+    Returns the absolute path. RecorderError where matplotlib isn't installed or the file can't be
+    written.
     """
     try:
         from matplotlib.figure import Figure

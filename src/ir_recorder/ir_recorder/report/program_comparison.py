@@ -402,7 +402,7 @@ def write_before_after(
     costs: Costs | None = None,
     roots: FileRoots = ANYWHERE,
 ) -> Path:
-    """Writes the page below `roots`; its absolute path. PathError when it can't be written."""
+    """Writes the page below `roots`; its absolute path. RecorderError when it can't be written."""
     return write_output(path, before_after_html(found, cell, costs).encode(), PAGE_START, roots)
 
 

@@ -29,7 +29,7 @@ def write_robots(
     path: str | Path,
     roots: FileRoots = ANYWHERE,
 ) -> Path:
-    """Writes the page below `roots`; its absolute path. PathError when it can't be written."""
+    """Writes the page below `roots`; its absolute path. RecorderError when it can't be written."""
     return write_output(path, robots_html(analyses, checks).encode(), PAGE_START, roots)
 
 

@@ -17,7 +17,7 @@ from xml.sax.saxutils import escape
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from ir_recorder.analysis import Analysis, StepResult
-from ir_recorder.errors import PathError, RecorderError
+from ir_recorder.errors import RecorderError
 from ir_recorder.report.files import write_output
 from ir_recorder.report.number_text import ENGLISH
 from ir_values.files import ANYWHERE, FileRoots
@@ -90,7 +90,7 @@ def write_columns(
         return write_output(path, content, content[:_SAME], roots)
     if str(path).endswith(".parquet"):
         return write_output(path, _parquet(columns), PARQUET_START, roots)
-    raise PathError(f"{path}: a table ends in .csv, .xlsx or .parquet")
+    raise RecorderError(f"{path}: a table ends in .csv, .xlsx or .parquet")
 
 
 def _csv(columns: Mapping[str, Sequence[TableValue]], locale: str) -> bytes:

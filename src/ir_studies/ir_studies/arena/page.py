@@ -119,7 +119,7 @@ _FREE = "The straight movement is free"
 
 
 def write_page(runs: Sequence[Run], settings: ArenaSettings, path: Path, missing: int = 0) -> Path:
-    """Write the page in place of another page; its absolute path. PathError when it can't be
+    """Write the page in place of another page; its absolute path. RecorderError when it can't be
     written.
     """
     return write_output(path, page_html(runs, settings, missing).encode(), PAGE_START, ANYWHERE)

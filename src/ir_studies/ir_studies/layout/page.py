@@ -192,7 +192,7 @@ def write_page(
     cell: Cell,
     path: Path,
 ) -> Path:
-    """Write the page in place of another page; its absolute path. PathError when it can't be
+    """Write the page in place of another page; its absolute path. RecorderError when it can't be
     written.
     """
     return write_output(
