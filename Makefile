@@ -4,6 +4,8 @@ SHELL := /bin/sh
 .PHONY: help setup setup-tests demo test test-long test-versions check sanitize processors bench bench-long compare docs clean
 # A sourced ROS 2 would put its own packages, of another Python, in front of the environment's.
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH ROS_DISTRO
+# Where a shell forbids bytecode, as many images do, every process compiles the sources that it imports.
+unexport PYTHONDONTWRITEBYTECODE
 
 BIN := .venv/bin
 # Both parts of the tests, whichever fails, and one summary.

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import yaml
-from scipy.spatial.transform import Rotation
 
 from ir_description import Cell
 from ir_description.poses import abc_from_rotation, composed, inverse, pose_of, rotation_from_abc
+from ir_planner.curves import turn_of
 from ir_values.arrays import FloatArray
 
 # Poses of a hand on the grid of millimetres and tenths of a degree.
@@ -51,7 +51,7 @@ def meant(dragged: FloatArray, before: FloatArray) -> FloatArray:
     """
     moved = np.abs(dragged[:3, 3] - before[:3, 3]) > _SAME_PLACE
     xyz = np.where(moved, np.round(dragged[:3, 3], MILLIMETRE), before[:3, 3])
-    turned = Rotation.from_matrix(dragged[:3, :3] @ before[:3, :3].T).magnitude() > _SAME_TURN
+    turned = turn_of(dragged[:3, :3] @ before[:3, :3].T) > _SAME_TURN
     if not turned:
         return pose_of(xyz, before[:3, :3])
     return pose_of(xyz, rotation_from_abc(np.round(abc_from_rotation(dragged[:3, :3]), TENTH)))

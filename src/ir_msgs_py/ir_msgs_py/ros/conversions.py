@@ -13,7 +13,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from builtin_interfaces.msg import Duration, Time
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
-from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
 from trajectory_msgs.msg import JointTrajectoryPoint
@@ -30,6 +29,7 @@ from ir_values.errors import (
     TrajectoryError,
     one_line,
 )
+from ir_values.rotations import quaternions_from_rotations, rotations_from_quaternions
 
 NS_PER_S = 1_000_000_000
 
@@ -148,10 +148,7 @@ that it is a mistake and refused.
 def pose_to_msg(T: FloatArray) -> Pose:
     """Pose (4, 4) [m]; the quaternion has w >= 0."""
     pose = read_only(T, "pose", (4, 4))
-    rotation = Rotation.from_matrix(
-        pose[:3, :3].copy()
-    )  # SciPy before 1.12 refuses read-only arrays
-    x, y, z, w = (float(value) for value in rotation.as_quat(canonical=True))
+    x, y, z, w = quaternions_from_rotations(pose[:3, :3]).tolist()
     return Pose(position=point_to_msg(pose[:3, 3]), orientation=Quaternion(x=x, y=y, z=z, w=w))
 
 
@@ -176,7 +173,7 @@ def pose_from_msg(msg: Pose) -> FloatArray:
             StatusCode.INVALID_GOAL_CONSTRAINTS,
         )
     T = np.eye(4)
-    T[:3, :3] = Rotation.from_quat(quaternion).as_matrix()
+    T[:3, :3] = rotations_from_quaternions(quaternion)
     T[:3, 3] = position
     return read_only(T, "pose", (4, 4))
 

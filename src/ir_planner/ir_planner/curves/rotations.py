@@ -9,6 +9,7 @@ import numpy as np
 
 from ir_kernels import portable
 from ir_values.arrays import FloatArray
+from ir_values.rotations import quaternions_from_rotations
 
 _SMALL = 1e-2  # rad: below, series to the fourth power are exact to rounding
 _ITERATIONS = 10
@@ -37,7 +38,7 @@ def rotation_of(vectors: FloatArray) -> FloatArray:
 
 def rotation_vector(rotations: FloatArray) -> FloatArray:
     """The shortest vectors (..., 3) [rad] whose `rotation_of` are these rotations (..., 3, 3)."""
-    q = _quaternions(rotations)
+    q = quaternions_from_rotations(rotations)
     sine = np.sqrt((q[..., :3] * q[..., :3]).sum(axis=-1))
     angle = 2.0 * np.asarray(portable.arctan2(sine, q[..., 3]))
     small = angle < _SMALL
@@ -51,7 +52,7 @@ def rotation_vector(rotations: FloatArray) -> FloatArray:
 
 def turn_of(rotations: FloatArray) -> FloatArray:
     """Angles (...) of rotations (..., 3, 3) [rad]."""
-    q = _quaternions(rotations)
+    q = quaternions_from_rotations(rotations)
     sine = np.sqrt((q[..., :3] * q[..., :3]).sum(axis=-1))
     return np.asarray(2.0 * portable.arctan2(sine, q[..., 3]))
 
@@ -62,16 +63,6 @@ def turned_evenly(first: FloatArray, last: FloatArray, share: FloatArray) -> Flo
     """
     turn = rotation_vector(portable.matmul(first.T, last))
     return portable.matmul(first, rotation_of(np.asarray(share)[:, None] * turn))
-
-
-def _quaternions(rotations: FloatArray) -> FloatArray:
-    """(..., 4) x, y, z, w with w >= 0."""
-    from scipy.spatial.transform import Rotation
-
-    R = np.asarray(rotations, dtype=float)
-    q = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat()  # roots and quotients alone
-    q = np.where(q[:, 3:] < 0.0, -q, q)
-    return q.reshape(*R.shape[:-2], 4)
 
 
 class RotationSpline:

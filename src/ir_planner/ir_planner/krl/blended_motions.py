@@ -1,12 +1,13 @@
 """Motions as curves of the axes with their time laws, one by one or blended."""
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from ir_kernels import portable
 from ir_krl import Blend, KrlMotionError, Motion, Place, Speeds, Target
@@ -17,6 +18,9 @@ from ir_planner.krl.geometry import Arm
 from ir_planner.scene import STILL, MotionLimits, PlanningScene, torque_use
 from ir_planner.timing import GRID_NS, GRID_S, TimeLaw, free_law
 from ir_values.arrays import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 # What motions draw: straight lines of the axes, and lines, arcs and splines of the tool as joint
 # curves.

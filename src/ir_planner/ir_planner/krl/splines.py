@@ -1,12 +1,13 @@
 """Splines: blocks of several parts driven without a stop, and their motions of the tool."""
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import BSpline
-from scipy.optimize import linprog
 
 from ir_kernels import portable
 from ir_krl import Blend, KrlMotionError, Motion, Speeds, SplineBlock, Target, TimeBlock
@@ -27,6 +28,9 @@ from ir_planner.krl.geometry import Arm, tool_in_flange
 from ir_planner.scene import PlanningScene, torque_use
 from ir_planner.timing import GRID_NS, GRID_S
 from ir_values.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 # When a PTP_SPLINE passes its points: near the planned times as far as the limits allow.
 #
@@ -127,6 +131,8 @@ def _change(problem: _Problem, slowness: FloatArray, used: FloatArray, trust: fl
     planned = problem.steps.sum()
     lasting = problem.lasting(slowness)
     one = np.eye(count)
+    from scipy.optimize import linprog  # half a second of imports, for who needs a schedule
+
     none = np.zeros((count, 1))
     limits = np.column_stack(
         [slopes, np.zeros_like(slopes), -np.ones(len(rows)), np.zeros(len(rows))]

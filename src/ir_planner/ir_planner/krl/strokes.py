@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ir_kernels import portable
 from ir_krl import WrittenPath
@@ -144,6 +143,8 @@ def _objection(
     """Why what is driven isn't the planned path at its speed ("": it is), and whether a lower
     acceleration may help.
     """
+    from scipy.spatial import cKDTree
+
     for one, stroke in zip(driven, strokes, strict=True):
         (again,) = _strokes(one, scene)
         share = again.top / stroke.top
@@ -167,6 +168,8 @@ def deviation_along(driven: JointTrajectory, planned: JointTrajectory) -> float:
     """Largest difference of a joint [rad] from the nearest configuration of the planned
     movement.
     """
+    from scipy.spatial import cKDTree
+
     dense = planned.sample(
         np.linspace(0.0, planned.duration, max(int(planned.duration * _RATE), 2) * 4)
     ).q

@@ -1,7 +1,6 @@
 """Movements written as a PTP_SPLINE with a TIME_BLOCK, near to what was planned."""
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from ir_kernels import portable
 from ir_krl import WrittenSpline
@@ -124,6 +123,8 @@ def deviation_in_time(
     spline: WrittenSpline, driven: JointTrajectory, planned: JointTrajectory
 ) -> float:
     """Largest difference of a joint [rad], each point passed when the spline passes it."""
+    from scipy.interpolate import PchipInterpolator
+
     passed = np.concatenate([[0.0], np.cumsum(spline.shares)]) / spline.shares.sum()
     share = np.linspace(0.0, 1.0, max(round(planned.duration * _SAMPLES_PER_S), 2))
     meanwhile = np.clip(

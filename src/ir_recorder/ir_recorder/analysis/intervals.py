@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy.special import bdtr, stdtr, stdtrit
 
 from ir_values.arrays import FloatArray
 
@@ -46,6 +45,8 @@ def mean_of(values: FloatArray) -> Mean:
     mean = float(values.mean()) if len(values) else math.nan
     if alike(values):
         return Mean(mean, math.nan, math.nan)
+    from scipy.special import stdtrit  # a tenth of a second of imports, for who asks
+
     error = _error(values)
     k = _skewness(values) / math.sqrt(len(values))
     t = float(stdtrit(len(values) - 1, 0.5 + 0.5 * LEVEL))
@@ -74,6 +75,8 @@ def _rank(count: int) -> int:
     """The largest k for which as many as k of `count` values lie below the median in at most half
     of 1 - LEVEL; -1 where there is none.
     """
+    from scipy.special import bdtr
+
     return (
         int(np.searchsorted(bdtr(np.arange(count), count, 0.5), 0.5 * (1.0 - LEVEL), "right")) - 1
     )
@@ -83,6 +86,8 @@ def chance_of(values: FloatArray) -> float:
     """How likely a mean as far from zero is by chance alone; NaN where values (N,) are alike."""
     if alike(values):
         return math.nan
+    from scipy.special import stdtr
+
     away = float(values.mean()) / _error(values)
     k = _skewness(values) / math.sqrt(len(values))
     least = max(0.0, min(abs(away), math.copysign(1.0, away) * _hall(away, k)))

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from math import exp, log1p
 
 import numpy as np
-from scipy.linalg import solve_banded
 
 from ir_description import IDLE, LINK, PowerParameters, RobotModel, centre_directions
 from ir_description.robot import DcLink
@@ -121,6 +120,8 @@ def _soft_flow(
 
     No kink stops a descent, however many samples change from one state of the link to another.
     """
+    from scipy.linalg import solve_banded
+
     top, by_top = limit
     given, held, conducts, passes, loses = np.empty((5, len(wanted)))
     for k, joules in enumerate((wanted * step).tolist()):

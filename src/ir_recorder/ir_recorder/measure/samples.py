@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
 from ir_description import Load
 from ir_msgs_py.modes import REST_MODES, Mode
@@ -24,6 +24,9 @@ from ir_recorder.traces.trace import (
     resampled,
 )
 from ir_values.arrays import BoolArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 # What a robot did, sample by sample on one grid: motion, mode, load and, where there is a meter,
 # watts.
@@ -95,6 +98,8 @@ class Samples:
     @cached_property
     def _between_readings(self) -> csr_matrix:
         """The share of each sample (columns) that lies between two readings (rows)."""
+        from scipy.sparse import csr_matrix
+
         assert self.readings is not None  # asked before
         edges = self.time[0] + self.step * (np.arange(len(self) + 1) - 0.5)
         inside = self.readings[(self.readings > edges[0]) & (self.readings < edges[-1])]

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
-from scipy.signal import correlate
 
 from ir_recorder.errors import RecorderError
 from ir_values.arrays import FloatArray
@@ -190,7 +189,7 @@ def clock_offset(
     """
     first = _regular(time, watts)
     second = _regular(other_time, other_watts)
-    products = correlate(first - first.mean(), second - second.mean(), method="fft")
+    products = _correlated(first - first.mean(), second - second.mean())
     lags = np.arange(len(products)) - (len(second) - 1)
     overlap = _norms(first - first.mean(), second - second.mean())
     score = np.where(
@@ -222,10 +221,18 @@ def _norms(first: FloatArray, second: FloatArray) -> FloatArray:
     """
     ones_first = np.ones(len(first))
     ones_second = np.ones(len(second))
-    own = correlate(first**2, ones_second, method="fft").clip(0.0)
-    other = correlate(ones_first, second**2, method="fft").clip(0.0)
+    own = _correlated(first**2, ones_second).clip(0.0)
+    other = _correlated(ones_first, second**2).clip(0.0)
     floor = 0.2 * min(float(first @ first), float(second @ second)) + 1e-12
     return np.asarray(np.sqrt(np.maximum(own, floor) * np.maximum(other, floor)))
+
+
+def _correlated(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Sums of products (N + M - 1,) at every lag from -(M - 1), by Fourier transforms."""
+    count = len(first) + len(second) - 1
+    size = 1 << (count - 1).bit_length()
+    product = np.fft.rfft(first, size) * np.fft.rfft(second[::-1], size)
+    return np.fft.irfft(product, size)[:count]
 
 
 def _parabola(score: FloatArray, peak: int) -> float:

@@ -10,7 +10,6 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, Transform, TransformStamped, Vector3
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from scipy.spatial.transform import Rotation
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -19,6 +18,7 @@ from ir_msgs_py import names
 from ir_msgs_py.ros.conversions import pose_to_msg, time_to_msg
 from ir_sim_driver.controller import Driver
 from ir_values.arrays import FloatArray
+from ir_values.rotations import quaternions_from_rotations, rotations_from_quaternions
 
 # Robot and load as markers: each capsule a cylinder and two balls, in the world.
 
@@ -40,7 +40,7 @@ class RobotMarkers:
         turns = [turn_z_to(*axis) for axis in zip(axes, lengths.tolist(), strict=True)]
         self._links = [capsule.link for capsule in capsules]
         self._ends = np.array([(c.p0, c.p1) for c in capsules]).reshape(-1, 2, 3)
-        self._turns = Rotation.from_quat(turns) if turns else None
+        self._turns = rotations_from_quaternions(np.array(turns)) if turns else None
         parts = [("robot", robot), ("load", load)]
         self._pairs = [
             _pair(name, k, capsule) for name, part in parts for k, capsule in enumerate(part)
@@ -57,7 +57,7 @@ class RobotMarkers:
             return self._message
         poses = link_poses[self._links]
         ends = np.einsum("kij,kej->kei", poses[:, :3, :3], self._ends) + poses[:, None, :3, 3]
-        turned = (Rotation.from_matrix(poses[:, :3, :3]) * self._turns).as_quat()
+        turned = quaternions_from_rotations(poses[:, :3, :3] @ self._turns)
         places = zip(self._pairs, ends.mean(axis=1), turned, ends, strict=True)
         for (cylinder, balls), centre, quaternion, both in places:
             cylinder.header.stamp = stamp
