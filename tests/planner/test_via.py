@@ -195,7 +195,7 @@ VIA_CELL = replace(
 )
 
 
-@pytest.mark.parametrize("cycle_time", [0.0, 40.0])
+@pytest.mark.parametrize("cycle_time", [pytest.param(0.0, marks=pytest.mark.long), 40.0])
 def test_steps_of_a_program_pass_their_places(cycle_time: float) -> None:
     """Found and judged in the cell that its file says."""
     cell = cell_from_yaml(cell_to_yaml(VIA_CELL), "via.yaml")

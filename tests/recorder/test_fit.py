@@ -250,6 +250,7 @@ def test_degrees_without_their_unit_and_other_robots_are_refused() -> None:
         check_range("run.csv", CELL.robot, np.degrees(q))
 
 
+@pytest.mark.long
 def test_a_meter_with_a_clock_of_its_own_is_fitted_from_csv(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import _paper_cost
 import _paper_line
+import _paper_result
 import _paper_savings
 import numpy as np
 import paper
@@ -19,6 +20,14 @@ PAGE = (Path(__file__).parents[2] / "docs" / "reproduction.md").read_text()
 CLAIMS = [
     name for name in paper.EXPERIMENTS if name not in ("modes", "figures", "figures_1_2", "eq_8")
 ]
+
+
+@pytest.fixture(autouse=True)
+def _few_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Intervals of figures that were made up need no thousand of them."""
+    monkeypatch.setattr(_paper_result, "RESAMPLES", 100)
+
+
 # A phrase, which statement of the experiment it is about, and the verdicts that it may stand
 # beside.
 PHRASES: dict[str, tuple[tuple[str, int, tuple[str, ...]], ...]] = {
