@@ -3,7 +3,7 @@
     python tools/run_tests.py [what pytest takes]
 
 The tests of tests/system start the nodes as processes, with a robot that moves in real time: they
-run last, in one process and alone on the machine. Both parts run to their end whatever fails.
+run last, two files at a time, alone on the machine. Both parts run to their end whatever fails.
 Paths and options are pytest's (`tests/planner -n0`, `-k energy`); a part whose paths are not asked
 for is left out.
 """
@@ -58,7 +58,8 @@ def parts(words: list[str], workers: int) -> list[Part]:
         shared = ("-n", str(workers), "--dist", "worksteal", "--ignore", SYSTEM)
         found.append(Part("others", (*shared, *options, *others)))
     if system or not paths:
-        found.append(Part("system", (*without_workers(options), *(system or [SYSTEM]))))
+        two = ("-n", "2", "--dist", "loadfile")  # one waits for its robot while the other computes
+        found.append(Part("system", (*two, *without_workers(options), *(system or [SYSTEM]))))
     return found
 
 

@@ -47,7 +47,7 @@ def test_each_part_runs_what_is_asked_of_it(
     if others is not None:
         expected["others"] = [*shared, *others.split("|")]
     if system is not None:
-        expected["system"] = system.split("|")
+        expected["system"] = ["-n", "2", "--dist", "loadfile", *system.split("|")]
     assert asked == expected
 
 
