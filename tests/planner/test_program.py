@@ -290,9 +290,7 @@ def test_the_chain_is_the_cheapest_of_all_that_the_planner_can_move_along(
         scene = route.arriving(hop)
         cheapest = {}
         for b, there in enumerate(layers[hop + 1]):
-            entry = timed_service(
-                there.line, True, asked(scene).at(stations[hop])
-            ).evaluation.report
+            entry = timed_service(there.line, True, asked(scene).at(stations[hop])).report
             for a, before in total.items():
                 here = layers[hop][max(a, 0)]
                 across = plan_regional(
@@ -301,7 +299,7 @@ def test_the_chain_is_the_cheapest_of_all_that_the_planner_can_move_along(
                 chain = before + cost(across.report) + cost(entry)
                 if hop:
                     line = timed_service(here.line, False, asked(scene).at(stations[hop - 1]))
-                    chain += cost(line.evaluation.report)
+                    chain += cost(line.report)
                 cheapest[b] = min(chain, cheapest.get(b, np.inf))
         total = cheapest
     found = sum(cost(movement.report) for movement in plan.movements if not movement.is_pause)

@@ -99,7 +99,7 @@ def test_refined_is_better_than_the_same_path_in_straight_steps(
     options = PlanOptions(objective=objective, safety_distance=0.0, time_value=500.0)
     refined = movement_over(path, Context.of(demo_scene, options, unhurried()))
     straight = straight_steps(path, Context.of(demo_scene, options, unhurried()))
-    assert refined.violation is None
+    assert refined.prove().violation is None
     value, before = (
         objective_value(m.report, objective, options.time_value) for m in (refined, straight)
     )
@@ -145,7 +145,7 @@ def test_joules_fall_with_the_requested_duration_and_it_is_met(demo_scene: Plann
     for factor in (1.02, 1.2, 1.6):
         requested = replace(options, duration=factor * fastest)
         movement = movement_over(path, Context.of(demo_scene, requested, unhurried()))
-        assert movement.violation is None
+        assert movement.prove().violation is None
         assert movement.trajectory.duration == pytest.approx(factor * fastest, rel=2e-6)
         report = movement.report
         joules.append(report.energy - report.base_energy)

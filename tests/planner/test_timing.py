@@ -30,6 +30,7 @@ from ir_planner.timing.blended_steps import (
     standing,
     stretched,
 )
+from ir_planner.timing.movement import Movement
 from ir_planner.timing.objective import best_stretch
 from ir_planner.timing.ptp import fastest, fastest_law
 from ir_planner.timing.spline_timing import time_spline
@@ -125,7 +126,7 @@ def test_a_requested_duration_is_met_and_too_short_a_one_refused(
     path = np.stack([degrees(0, -90, 90, 0, 0, 0), degrees(40, -80, 90, 0, 0, 0)])
     movement = straight_steps(path, Context.of(demo_scene, PlanOptions(duration=3.25), budget))
     assert movement.trajectory.duration == pytest.approx(3.25, abs=1e-5)
-    assert movement.violation is None
+    assert movement.prove().violation is None
     with pytest.raises(RequestError, match=r"duration is 0\.2 s: the shortest"):
         straight_steps(path, Context.of(demo_scene, PlanOptions(duration=0.2), budget))
 
@@ -137,7 +138,7 @@ def test_asynchronous_joints_arrive_on_their_own(
     path = np.stack([degrees(*start), degrees(*goal)])
     options = PlanOptions(objective="time", timing="asynchronous", safety_distance=0.0)
     movement = straight_steps(path, Context.of(demo_scene, options, budget))
-    assert movement.violation is None
+    assert movement.prove().violation is None
     common = fastest(path[0], path[1], demo_scene.limits, demo_scene.dynamics)
     delta = path[1] - path[0]
     laws, joined = own_laws(path[0], delta, common, demo_scene.limits, demo_scene.dynamics)
@@ -167,7 +168,7 @@ def test_corners_are_cut_within_the_limits_and_save_time(
     )
     stopping = blended(TimedPath(path, laws, (0,)), NAMES)
     assert movement.trajectory.duration < stopping.duration - 0.05
-    assert movement.violation is None
+    assert movement.prove().violation is None
 
 
 def test_a_blend_is_the_sum_of_its_laws() -> None:
@@ -284,3 +285,43 @@ def test_where_joules_count_the_best_shape_is_taken(
     value = report.energy + options.time_value * report.duration
     other = movement_energy(alone, demo_scene).total + options.time_value * alone.duration
     assert value <= other * 1.002, "coarse sampling of the candidates may cost a trifle, no more"
+
+
+def test_proofs_are_handed_on_to_no_other_scene_distance_or_station(
+    demo_scene: PlanningScene, degrees: Degrees, budget: Work
+) -> None:
+    path = np.stack([degrees(0, -90, 90, 0, 0, 0), degrees(40, -80, 90, 0, 0, 0)])
+    context = Context.of(demo_scene, PlanOptions(), budget)
+    movement = straight_steps(path, context)
+    assert movement.prove().certified
+    station = demo_scene.cell.stations[0].name
+    options = replace(context.options, safety_distance=1.0)
+    others = {
+        "S_m": replace(context, options=options),
+        "scene": context.inside(replace(demo_scene)),
+        "tool": replace(context, options=replace(context.options, tool_speed=1e-3)),
+        "tilt": replace(
+            context, options=replace(context.options, tilt_max=1e-3, tilt_axis=(1.0, 0.0, 0.0))
+        ),
+        "rest": context.in_motion(np.ones((2, 2, 6))),
+    }
+    for what, other in others.items():
+        asked = movement.asked_by(other)
+        assert asked.proofs is not movement.proofs, what
+        anew = Movement(path, movement.trajectory, other)
+        assert asked.prove().status == anew.prove().status, what
+    assert not movement.asked_by(others["S_m"]).prove().certified
+    assert not movement.asked_by(others["tool"]).prove().certified
+    at_station = Movement(path, movement.trajectory, context.at(station), known=movement.proofs)
+    assert at_station.proofs is not movement.proofs
+    assert movement.stretched_by(2.0).proofs is not movement.proofs
+
+
+def test_proofs_are_kept_where_only_the_objective_or_the_waypoints_differ(
+    demo_scene: PlanningScene, degrees: Degrees, budget: Work
+) -> None:
+    path = np.stack([degrees(0, -90, 90, 0, 0, 0), degrees(40, -80, 90, 0, 0, 0)])
+    context = Context.of(demo_scene, PlanOptions(), budget)
+    movement = straight_steps(path, context)
+    assert movement.asked_by(context.asking("energy")).proofs is movement.proofs
+    assert movement.passing(path[[0, 0, 1]]).proofs is movement.proofs

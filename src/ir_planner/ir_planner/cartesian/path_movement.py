@@ -130,7 +130,7 @@ def _best_at(asked: ToolPathRequest, layers: Layers) -> DrivenPath:
         with journal.stage("proof") as notes:
             for one in sorted(driven, key=lambda one: one.movement.coarse_cost):
                 one = farther_from_limits(asked, one)
-                violation = one.movement.violation
+                violation = one.movement.prove().violation
                 if violation is None:
                     return one
                 notes.append(violation.sentence)
@@ -210,7 +210,7 @@ def farther_from_limits(asked: ToolPathRequest, one: DrivenPath) -> DrivenPath:
     """The same with more distance from the limits where the interpolant between points exceeds
     one.
     """
-    violation = one.movement.violation
+    violation = one.movement.prove().violation
     if violation is None or violation.what not in _LIMITS:
         return one
     try:
@@ -220,7 +220,7 @@ def farther_from_limits(asked: ToolPathRequest, one: DrivenPath) -> DrivenPath:
 
 
 def _uncertified(one: DrivenPath) -> PathRefusedError:
-    violation = one.movement.violation
+    violation = one.movement.prove().violation
     assert violation is not None  # that is why it is asked
     place = _place_at(one.sent, violation.time)
     return PathRefusedError(
@@ -237,7 +237,7 @@ def _place_at(path: SentPath, time: float) -> float:
 
 def _without(layers: Layers, one: DrivenPath) -> Layers:
     """The layers without the configurations near where a movement isn't certified."""
-    violation = one.movement.violation
+    violation = one.movement.prove().violation
     assert violation is not None  # that is why it is asked
     place = _place_at(one.sent, violation.time)
     q = one.movement.trajectory.sample([violation.time]).q[0]

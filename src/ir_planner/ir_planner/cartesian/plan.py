@@ -209,7 +209,7 @@ def choices_along(
         context.work.check()
         try:
             driven = farther_from_limits(whole.asked, timed(whole.asked, chain))
-            if driven.movement.certified:
+            if driven.movement.prove().certified:
                 whole.kept(driven)
                 found.append(driven)
         except PathRefusedError as error:

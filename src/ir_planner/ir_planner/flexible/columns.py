@@ -68,7 +68,7 @@ class MovementColumn:
         for one in reversed(fitting):
             factor = int(1e6 * seconds / one.trajectory.duration) / 1e6
             slower = one.stretched_by(factor) if factor > 1.0 else one
-            if slower.energy.total < best.energy.total and slower.certified:
+            if slower.energy.total < best.energy.total and slower.prove().certified:
                 return slower
         return best
 
@@ -132,7 +132,7 @@ def slowed_down(front: list[Movement]) -> list[Movement]:
     for factor in _SLOWER:
         slower = slowest.stretched_by(factor)
         now = slower.energy.total - slower.energy.base
-        if now >= drives or not slower.certified:
+        if now >= drives or not slower.prove().certified:
             break
         drives = now
         found.append(slower)

@@ -123,7 +123,7 @@ class Descents:
             if found and work.exhausted:
                 break
             movement = self._refinement.refined(solution, path, THOROUGH)
-            if movement is not None and movement.certified:
+            if movement is not None and movement.prove().certified:
                 found.append(movement)
             else:
                 self.context.journal.reject("not certified after descent")

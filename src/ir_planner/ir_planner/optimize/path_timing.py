@@ -500,9 +500,8 @@ def rescaled(
         return Movement(movement.path, found.trajectory, context, kept)
 
     found = within_torque(along, context)
-    if found is not None and found.violation is not None:
-        context.journal.reject(
-            f"a time scaling along the path isn't certified: {found.violation.what}"
-        )
+    violation = None if found is None else found.prove().violation
+    if violation is not None:
+        context.journal.reject(f"a time scaling along the path isn't certified: {violation.what}")
         return None
     return found

@@ -244,9 +244,10 @@ class Portfolio:
     def best(self) -> tuple[str, Movement] | None:
         """The best movement with its method, certified as it is sent."""
         for method, movement in self.found:
-            if movement.violation is None:
+            violation = movement.prove().violation
+            if violation is None:
                 return method, movement
-            self.journal.reject(f"not proved: {movement.violation.what}")
+            self.journal.reject(f"not proved: {violation.what}")
         return None
 
     def in_straight_steps(self, paths: list[tuple[str, FloatArray]]) -> tuple[str, Movement] | None:
@@ -260,8 +261,9 @@ class Portfolio:
             except TimingError as error:
                 self.journal.reject(f"torque: {error}")
                 continue
-            if movement.violation is not None:
-                self.journal.reject(f"not proved: {movement.violation.what}")
+            violation = movement.prove().violation
+            if violation is not None:
+                self.journal.reject(f"not proved: {violation.what}")
             elif best is None or movement.cost < best[1].cost:
                 best = method, movement
         return best

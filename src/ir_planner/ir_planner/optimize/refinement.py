@@ -155,7 +155,7 @@ def within_duration(fastest: Movement, context: Context, near: Near) -> Movement
             known = found
             early = value
             slower = replace(found, context=context).stretched_by(max(requested / duration, 1.0))
-            if slower.certified and (best is None or slower.cost < best.cost):
+            if slower.prove().certified and (best is None or slower.cost < best.cost):
                 best = slower
             if duration > _ENOUGH * requested:
                 break
@@ -302,7 +302,7 @@ class Refinement:
         starts = [(self._coarse_near(one), one.path) for one in known]
         coarse, path = min(starts, key=lambda start: start[0].cost)
         found = self.refined(coarse, path)
-        return found if found is not None and found.certified else None
+        return found if found is not None and found.prove().certified else None
 
     def _coarse_near(self, known: Movement) -> Solution:
         robot = self.context.scene.cell.robot
@@ -330,7 +330,7 @@ class Refinement:
                 movement = replace(found, context=self.context).stretched_by(
                     max(requested / duration, 1.0)
                 )
-                if movement.astray is None:
+                if movement.prove_path() is None:
                     cheaper = within_duration(
                         found, self.context, lambda one, asked: Refinement(asked).near([one])
                     )
@@ -484,9 +484,12 @@ class Refinement:
             return None if trajectory is None else Movement(path, trajectory, self.context)
 
         movement = within_torque(slowed, self.context)
-        if movement is None or movement.astray is not None:
-            return None if movement is None else movement.astray
-        return movement if movement.torque.violation is None else None
+        if movement is None:
+            return None
+        astray = movement.prove_path()
+        if astray is not None:
+            return astray
+        return movement if movement.prove_torque().violation is None else None
 
     def _slowed(self, spline: UniformSpline, limits: MotionLimits) -> JointTrajectory | None:
         """The motion as it is sent, slowed to its limits; None where that is not enough, or slower
@@ -515,7 +518,7 @@ def movement_over(path: FloatArray, context: Context) -> Movement:
     if context.options.timing == "asynchronous":
         common = movement_over(path, context.with_timing("synchronous"))
         own = straight_steps(distinct(path), context)
-        return own if own.certified and own.cost <= common.cost else common
+        return own if own.prove().certified and own.cost <= common.cost else common
     path = distinct(path)
     if len(path) > 1:
         refinement = Refinement(context)
@@ -524,7 +527,7 @@ def movement_over(path: FloatArray, context: Context) -> Movement:
             QUICK,
         ):  # the second ends elsewhere, where the first isn't certified
             found = refinement.refined(refinement.coarse(path, effort.coarse), path, effort)
-            if found is not None and found.certified:
+            if found is not None and found.prove().certified:
                 return found
         refinement.check_requested()
     return straight_steps(path, context)

@@ -326,7 +326,7 @@ def _slower(movement: Movement, duration: float) -> Movement | None:
         return None
     factor = np.floor(1e6 * duration / movement.trajectory.duration) / 1e6
     slower = movement.stretched_by(max(float(factor), 1.0))
-    return slower if slower.certified else None
+    return slower if slower.prove().certified else None
 
 
 # A program's energy at the mains over its cycle time: every point a certified program.

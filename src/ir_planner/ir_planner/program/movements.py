@@ -33,7 +33,9 @@ def optimised_near(known: Sequence[Movement], context: Context) -> Movement | No
     them slowed down; None where neither is certified.
     """
     found = (optimize.optimised_near_best(known, context), slowed_near(known, context))
-    certified = [movement for movement in found if movement is not None and movement.certified]
+    certified = [
+        movement for movement in found if movement is not None and movement.prove().certified
+    ]
     return min(certified, key=lambda movement: movement.cost, default=None)
 
 
@@ -43,7 +45,7 @@ def slowed_near(known: Sequence[Movement], context: Context) -> Movement | None:
     """
     slower = [_slowed(one, best_stretch(one.trajectory, context), context) for one in known]
     cheapest = sorted(slower, key=lambda movement: movement.coarse_cost)
-    return next((movement for movement in cheapest if movement.certified), None)
+    return next((movement for movement in cheapest if movement.prove().certified), None)
 
 
 def _slowed(one: Movement, factor: float, context: Context) -> Movement:
@@ -345,10 +347,9 @@ class Movements:
             )
         except TimingError as error:
             return Failure(Status(StatusCode.PLANNING_FAILED, f"{what}: {error}"))
-        if found.violation is not None:
-            return Failure(
-                Status(StatusCode.PLANNING_FAILED, f"{what}: {found.violation.sentence}")
-            )
+        violation = found.prove().violation
+        if violation is not None:
+            return Failure(Status(StatusCode.PLANNING_FAILED, f"{what}: {violation.sentence}"))
         same = slowed_near(scaling, at)
         return same if same is not None and same.cost < found.cost else found
 

@@ -97,7 +97,7 @@ def _plain(part: HopPart, movements: Movements) -> Movement | None:
     """The baseline movement of a part across, None where it isn't certified."""
     first, second = movements.ends(part)
     found = baseline(first, second, movements.asking(part, movements.context))
-    return found if found is not None and found.certified else None
+    return found if found is not None and found.prove().certified else None
 
 
 def _all_found(parts: list[HopPart], movements: Movements, improvement: int) -> list[Movement]:
@@ -116,7 +116,7 @@ def _in_straight_steps(found: Movement) -> Movement:
         along = straight_steps(found.path, found.context)
     except TimingError:
         return found
-    return along if along.certified else found
+    return along if along.prove().certified else found
 
 
 def _side_by_side(

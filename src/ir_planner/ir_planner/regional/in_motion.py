@@ -310,8 +310,9 @@ def _stop_and_go(
         whole = whole.then(_backwards(run_up))
         path = np.concatenate([path, end.q[None]])
     common = Movement(distinct(path), whole, context)
-    if common.violation is not None:
-        return common.violation.sentence, None
+    violation = common.prove().violation
+    if violation is not None:
+        return violation.sentence, None
     return "", common
 
 

@@ -189,7 +189,7 @@ def not_worse_than_baseline(
                 movement
                 for movement in _along(path, context, hurried=best is None)
                 if (best is None or movement.coarse_cost < _WORTH_PROVING * best[1].cost)
-                and movement.certified
+                and movement.prove().certified
                 and (best is None or movement.cost < best[1].cost)
             ]
             notes.append("costs less" if better else "costs more, or can't be done")
@@ -254,7 +254,7 @@ def _as_asked(found: Answer | None, context: Context) -> tuple[Answer | None, fl
         if own > requested * (1.0 + DURATION_SLACK):
             return None, own
         movement = movement.stretched_by(max(requested / own, 1.0))
-    return ((method, movement) if movement.certified else None), own
+    return ((method, movement) if movement.prove().certified else None), own
 
 
 def _with_others(
@@ -347,4 +347,4 @@ def _own(common: Movement, context: Context) -> Movement | None:
         return None
     if movement.timing == "synchronous":
         return None
-    return movement if movement.certified else None
+    return movement if movement.prove().certified else None

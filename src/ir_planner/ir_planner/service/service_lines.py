@@ -165,7 +165,7 @@ def timed_service(
 
     movement = within_torque(timed, context)
     assert movement is not None  # timed always makes one
-    violation = movement.violation
+    violation = movement.prove().violation
     if violation is not None and violation.what == "clearance":
         # the spline leaves the certified polyline where points lie far apart: refined from the
         # polyline

@@ -192,8 +192,9 @@ def _timed(
     except TimingError as error:
         context.journal.reject(f"torque: {error}")
         return None
-    if movement.violation is not None:
-        context.journal.reject(f"not proved: {movement.violation.what}")
+    violation = movement.prove().violation
+    if violation is not None:
+        context.journal.reject(f"not proved: {violation.what}")
         return None
     return path, movement
 

@@ -45,7 +45,7 @@ def baseline(start: FloatArray, goal: FloatArray, context: Context) -> Movement 
         return Movement(ends, at_best_duration(quickest, context), context)
 
     movement = within_torque(timed, context)
-    return movement if movement is not None and movement.torque.violation is None else None
+    return movement if movement is not None and movement.prove_torque().violation is None else None
 
 
 def baseline_costs_at_least(start: FloatArray, goal: FloatArray, context: Context) -> float:

@@ -203,7 +203,7 @@ class _Optimization:
             )
         with self.journal.stage("before") as notes:
             self.original = Movement(original.positions, original, self.context)
-            violation = self.original.violation
+            violation = self.original.prove().violation
             self.wrong = "" if violation is None else violation.sentence
             notes.append(self.wrong or "certified")
 
@@ -261,7 +261,7 @@ class _Optimization:
                 f"trajectory is {fastest.report.duration:.4g} s",
             )
         movement = fastest.stretched_by(requested / fastest.report.duration)
-        return movement if movement.certified else None
+        return movement if movement.prove().certified else None
 
     def _shortcut(self) -> list[UniformSpline]:
         """A start along the path with corners left out; none where its straight steps aren't
@@ -317,7 +317,7 @@ class _Optimization:
     def _standing(self) -> OptimizationPlan:
         """The end points are the same."""
         moves = np.abs(np.diff(self.path, axis=0)).max() >= STILL
-        if moves or not self.original.certified:
+        if moves or not self.original.prove().certified:
             why = "a loop would shrink to nothing: give its parts" if moves else self.wrong
             raise RequestError(
                 StatusCode.INVALID_MOTION_PLAN, f"the trajectory ends where it starts: {why}"

@@ -81,7 +81,7 @@ def plan_through(
         )
     context.journal.timing = movement.timing
     info = context.journal.info(start, context.joint_names)
-    status = movement.verification.status
+    status = movement.prove().status
     if not status.ok:
         return MovementPlan(status, info, movement.report)
     return MovementPlan(status, info, movement.report, movement.trajectory, reference.points)
@@ -135,7 +135,7 @@ def _followed(reference: Reference, context: Context) -> Movement:
             movement = _in_proportion(points, np.diff(reference.times), context)
         else:
             movement = best_along(points, context, notes)
-        violation = movement.violation
+        violation = movement.prove().violation
         if violation is None or violation.what not in _AT_STOPS:
             return movement
         notes.append(violation.sentence)
@@ -193,7 +193,7 @@ def best_along(points: FloatArray, context: Context, notes: list[str]) -> Moveme
     """
     hurry = context.asking("time")
     by_rules = _in_proportion(points, None, hurry)
-    if by_rules.violation is not None:
+    if by_rules.prove().violation is not None:
         return by_rules
     quickest = rescaled(by_rules, hurry)
     best = by_rules

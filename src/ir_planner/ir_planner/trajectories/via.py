@@ -164,7 +164,7 @@ class ViaSearch:
         fits = [
             movement
             for movement in (best, self._lasting(stopping))
-            if movement is not None and movement.certified
+            if movement is not None and movement.prove().certified
         ]
         return min(fits, key=lambda movement: movement.cost, default=None)
 
@@ -178,7 +178,7 @@ class ViaSearch:
 
     def _too_short(self, stopping: Movement) -> RequestError:
         check_requested(stopping.trajectory.duration, self.context)
-        violation = stopping.violation
+        violation = stopping.prove().violation
         why = "nothing is certified" if violation is None else violation.sentence
         return RequestError(StatusCode.INVALID_MOTION_PLAN, f"via: {why}")
 
@@ -329,8 +329,9 @@ class ViaSearch:
         requested = self.context.options.duration
         if requested > 0.0 and abs(movement.trajectory.duration - requested) > 1e-6 * requested:
             return False
-        if movement.violation is not None:
-            self.context.journal.reject(f"without stops: {movement.violation.what}")
+        violation = movement.prove().violation
+        if violation is not None:
+            self.context.journal.reject(f"without stops: {violation.what}")
             return False
         if passed(movement.trajectory, chain[1:-1], self.via, self.context.scene) is None:
             self.context.journal.reject("without stops: a place is missed")
