@@ -49,10 +49,10 @@ def measure(seed: int, quick: bool) -> list[Row]:
     return rows
 
 
-def blocked(seed: int, quick: bool) -> list[tuple[str, str, Question]]:
+def blocked(seed: int, quick: bool, places: int = PLACES) -> list[tuple[str, str, Question]]:
     """Questions whose straight movement is not free: tasks of cells, and among MOST zones of each
-    type; each with where it is asked (there and back, and movements among the same zones, are one
-    place) and its name.
+    type, in so many places; each with where it is asked (there and back, and movements among the
+    same zones, are one place) and its name.
     """
     tasks = [task for cell in CELLS for task in tasks_of(cell)]
     asked = [
@@ -64,7 +64,7 @@ def blocked(seed: int, quick: bool) -> list[tuple[str, str, Question]]:
     chosen = np.random.default_rng(5).permutation(len(blocked))[seed % 2 :: 2]
     found = [blocked[k] for k in chosen[: 1 if quick else TASKS]]
     for kind in KINDS:
-        for place in range(1 if quick else PLACES):
+        for place in range(1 if quick else places):
             among = questions(kind, (MOST,), 1 if quick else AMONG, _SEEDS * seed + _FIRST + place)
             name = f"{kind.lower()} zones {place}"
             found += [(name, f"{name} {k}", one[MOST]) for k, one in enumerate(among)]

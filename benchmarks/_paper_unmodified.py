@@ -139,7 +139,9 @@ def follows_closed(statements: Sequence[Statement]) -> str:
 POPULATIONS = (12, 24, 48, 96)
 GENERATIONS = (5, 20, 60)
 DEFAULT = (48, 20)
-TASKS = 2  # of each cell and seed
+TASKS = 2  # of each variant
+CHANGED = 33  # variants of each cell and seed
+_BRED = 60  # added to the seed: no other experiment draws these variants
 REAL_TIME = 100.0  # ms in which a person and a cell's cycle notice nothing
 
 
@@ -159,7 +161,8 @@ def measure_parameters(seed: int, quick: bool) -> list[Row]:
 
 def _tasks(seed: int, quick: bool) -> Iterator[Task]:
     for cell in CELLS[:1] if quick else CELLS[:3]:
-        yield from blocked(cell, seed + 40, 1)[: 1 if quick else TASKS]
+        for number in range(1, 2 if quick else 1 + CHANGED):
+            yield from blocked(cell, seed + _BRED, number)[: 1 if quick else TASKS]
 
 
 def _bred(task: Task, settings: Genetic, seed: int) -> Row:
@@ -274,9 +277,9 @@ EXPERIMENTS = (
         "The genetic correction's parameters against real time and energy",
         "Size of the population and number of generations decide whether the genetic algorithm "
         "works in real time, and how much energy its movement takes.",
-        f"{TASKS} blocked tasks of a variant of each of {', '.join(CELLS[:3])} per seed; all "
-        "generations are bred. The energy is that of the best path, driven in straight steps as "
-        "fast as the limits allow.",
+        f"{TASKS} blocked tasks of {CHANGED} variants of each of {', '.join(CELLS[:3])} per seed; "
+        "all generations are bred. The energy is that of the best path, driven in straight steps "
+        "as fast as the limits allow.",
         measure_parameters,
         judge_parameters,
         follows_parameters,
