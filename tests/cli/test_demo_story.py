@@ -18,6 +18,7 @@ from ir_cli.ros.demo import LONGEST_PAUSE, Demonstration, finish_recording, reco
 from ir_cli.ros.robots_demo import driven_together
 from ir_description import load_cell
 from ir_msgs_py.ros.client import ProgramRun
+from ir_msgs_py.ros.spinning import Cancellation
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_values.errors import CallTimedOutError, RequestRefusedError
 
@@ -121,13 +122,12 @@ def test_a_recording_is_finished_whatever_ends_what_is_recorded(tmp_path: Path) 
 def waiting(begun: threading.Event) -> Callable[..., ProgramRun]:
     """A robot that waits for another, and ends when it is given up."""
 
-    def drive(give_up: Callable[[], bool]) -> ProgramRun:
+    def drive(give_up: Cancellation) -> ProgramRun:
         begun.set()
-        deadline = time.monotonic() + PATIENCE
-        looks = threading.Event()
-        while not give_up() and time.monotonic() < deadline:
-            looks.wait(0.005)
-        raise RequestRefusedError("canceled in step 1" if give_up() else "waited too long", -7)
+        ended = threading.Event()
+        with give_up.calling(ended.set):
+            canceled = ended.wait(PATIENCE)
+        raise RequestRefusedError("canceled in step 1" if canceled else "waited too long", -7)
 
     return drive
 
@@ -135,7 +135,7 @@ def waiting(begun: threading.Event) -> Callable[..., ProgramRun]:
 def test_a_robot_that_fails_stops_the_others_and_its_reason_is_the_answer() -> None:
     begun = threading.Event()
 
-    def failing(give_up: Callable[[], bool]) -> ProgramRun:
+    def failing(give_up: Cancellation) -> ProgramRun:
         assert begun.wait(60.0)
         raise RequestRefusedError("the robot is not ready", -6)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -15,9 +16,11 @@ from ir_msgs.msg import PowerState, Station, Status
 from ir_msgs.srv import GetTrajectory, SetCell
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.ros import client as client_module
+from ir_msgs_py.ros import spinning as spinning_module
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.rclpy_inside import PatientActionServer
+from ir_msgs_py.ros.spinning import Cancellation
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.trajectory import JointTrajectory
@@ -128,8 +131,60 @@ def test_a_refusal_raises_its_sentence_and_code(client):
 
 
 def test_a_call_of_a_service_that_nobody_offers_can_be_given_up(client):
+    given_up = Cancellation()
+    given_up.cancel()
     with pytest.raises(CallGivenUpError):
-        client.call("/nowhere", SetCell.Request(), timeout=PATIENCE, give_up=lambda: True)
+        client.call("/nowhere", SetCell.Request(), timeout=PATIENCE, give_up=given_up)
+
+
+@pytest.fixture
+def seldom_looking(monkeypatch):
+    """Waits look at nothing until they are woken, or the test has no patience left."""
+    monkeypatch.setattr(spinning_module, "_SLICE", PATIENCE)
+    monkeypatch.setattr(client_module, "GONE", 10.0 * PATIENCE)
+
+
+@pytest.mark.usefixtures("seldom_looking")
+def test_a_goal_that_is_given_up_is_canceled_at_that_moment(client, cell):
+    given_up = Cancellation()
+    begun = time.monotonic()
+    with pytest.raises(RequestRefusedError) as caught:
+        client.run_program("endless", progress=lambda at: given_up.cancel(), give_up=given_up)
+    assert caught.value.code == -7
+    assert cell.canceled.is_set()
+    assert time.monotonic() - begun < 0.5 * PATIENCE
+
+
+@pytest.mark.usefixtures("seldom_looking")
+def test_a_call_that_is_given_up_ends_at_that_moment(client, cell, ros_executor):
+    given_up = Cancellation()
+    go_on = threading.Event()
+
+    def give_up(request, response):
+        given_up.cancel()
+        go_on.wait(PATIENCE)
+        return response
+
+    ros_executor.run(lambda: cell.create_service(SetCell, "silent", give_up))
+    begun = time.monotonic()
+    with pytest.raises(CallGivenUpError, match="the call of /silent was given up"):
+        client.call("/silent", SetCell.Request(), timeout=PATIENCE, give_up=given_up)
+    assert time.monotonic() - begun < 0.5 * PATIENCE
+    go_on.set()
+
+
+def test_a_cancellation_calls_back_once_and_only_while_somebody_waits():
+    called = []
+    cancellation = Cancellation()
+    with cancellation.calling(lambda: called.append("gone")):
+        pass
+    with cancellation.calling(lambda: called.append("waits")):
+        assert not cancellation.canceled
+        cancellation.cancel()
+        cancellation.cancel()
+        assert called == ["waits"]
+    with cancellation.calling(lambda: called.append("late")):
+        assert called == ["waits", "late"]
 
 
 def test_a_service_that_nobody_offers_is_named(client):

@@ -53,7 +53,7 @@ def test_no_goal_that_was_accepted_before_a_stop_or_its_recovery_is_driven(event
     waiting: list[tuple[int, Any]] = []
 
     def send(goal: Any, stopped: Any) -> Any:
-        assert not stopped()
+        assert not stopped.canceled
         driven.append(history)
         return Of(error_code=0, error_string="")
 
@@ -81,7 +81,7 @@ def test_no_goal_that_was_accepted_before_a_stop_or_its_recovery_is_driven(event
             executor.hear("number", number)
             executor.hear("latched", latched)
         elif event == "accept":
-            waiting.append((history, executor.watched(lambda: False)))
+            waiting.append((history, executor.accept()))
         elif waiting:
             accepted, stopped = waiting.pop(0)
             before = len(driven)
@@ -97,11 +97,11 @@ def test_no_goal_that_was_accepted_before_a_stop_or_its_recovery_is_driven(event
 def test_a_stop_while_it_is_driven_ends_it_with_the_words_of_the_controller() -> None:
     def send(goal: Any, stopped: Any) -> Any:
         executor.hear("number", 1)
-        assert stopped()
+        assert stopped.canceled
         return Of(error_code=-1, error_string="emergency stop")
 
     executor = TrajectoryExecution(send, lambda trajectory: None)
     executor.hear("number", 0)
-    status = executor.drive(TRAJECTORY, executor.watched(lambda: False))
+    status = executor.drive(TRAJECTORY, executor.accept())
     assert status.code == StatusCode.PREEMPTED
     assert status.message == "stopped along the path: emergency stop"

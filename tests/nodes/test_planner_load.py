@@ -20,6 +20,7 @@ from ir_msgs.action import Plan
 from ir_msgs.msg import PlanOptions, Status
 from ir_msgs.srv import CheckState, PlanRegionalMovement, SetCell
 from ir_msgs_py.ros.client import Client
+from ir_msgs_py.ros.spinning import Cancellation
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.ros.topics import ACTION_SERVICES, REQUESTS_WAITING, SERVICE
 from ir_planner.errors import CancelledError
@@ -112,7 +113,7 @@ def test_a_plan_that_its_client_gave_up_ends_and_nobody_elses(
     begun: list[str] = []
     ended: list[str] = []
     plan = planner_node.planner.plan_regional
-    given_up = threading.Event()
+    given_up = Cancellation()
 
     def endless(*, goal: Any, cancelled: Callable[[], bool], **asked: Any) -> Any:
         begun.append(goal.text)
@@ -126,7 +127,7 @@ def test_a_plan_that_its_client_gave_up_ends_and_nobody_elses(
         with Client(context=ros_context, node_name="impatient") as client:
             name = "ir_planner/plan_regional_movement"
             request = PlanRegionalMovement.Request(goal="park", start=STATE)
-            return client.call(name, request, PATIENCE, given_up.is_set)
+            return client.call(name, request, PATIENCE, given_up)
 
     monkeypatch.setattr(planner_node.planner, "plan_regional", endless)
     with ThreadPoolExecutor() as pool:
@@ -137,7 +138,7 @@ def test_a_plan_that_its_client_gave_up_ends_and_nobody_elses(
             call, PlanRegionalMovement, "plan_regional_movement", goal="home", start=STATE
         )
         assert not ended
-        given_up.set()
+        given_up.cancel()
         assert isinstance(first.exception(PATIENCE), CallGivenUpError)
         assert other.result(PATIENCE).status.code == Status.SUCCESS
     assert ended == ["park"]

@@ -13,7 +13,6 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from threading import Event
 
 import numpy as np
 
@@ -35,6 +34,7 @@ from ir_msgs_py import names
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros.client import Client, ProgramRun
+from ir_msgs_py.ros.spinning import Cancellation
 from ir_planner.robots import RobotsPlan, plan_robots
 from ir_recorder import Analysis, Finding, Verdict, analyse, findings, read_recording, summary
 from ir_recorder.analysis.robots import robot_findings
@@ -213,22 +213,22 @@ class RobotsDemonstration:
 def driven_together(
     drives: Mapping[str, Callable[..., ProgramRun]],
 ) -> tuple[dict[str, ProgramRun], str]:
-    """Drive all robots at once, by what drives each until its `give_up` says so: the runs that
+    """Drive all robots at once, by what drives each until its `give_up` is canceled: the runs that
     ended well, and why another did not, "" where all did. One that fails stops the others, and so
     does whatever is raised here, as by Ctrl-C.
     """
-    stopped = Event()
+    stopped = Cancellation()
     sentences: list[str] = []
     runs: dict[str, ProgramRun] = {}
 
     def drive(robot: str) -> None:
         try:
-            runs[robot] = drives[robot](give_up=stopped.is_set)
+            runs[robot] = drives[robot](give_up=stopped)
         except (DemonstrationError, IrError) as error:
             sentences.append(f"{robot}: {error}")
-            stopped.set()
+            stopped.cancel()
         except BaseException:
-            stopped.set()
+            stopped.cancel()
             raise
 
     with ThreadPoolExecutor(len(drives)) as pool:
@@ -239,7 +239,7 @@ def driven_together(
             for end in ends:
                 end.result()
         except BaseException:
-            stopped.set()
+            stopped.cancel()
             raise
     return runs, "; then ".join(sentences)
 

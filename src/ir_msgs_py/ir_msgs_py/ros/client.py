@@ -52,7 +52,7 @@ from ir_msgs_py.ros.plan_conversions import (
     report_from_msg,
 )
 from ir_msgs_py.ros.search_conversions import searches_from_msg
-from ir_msgs_py.ros.spinning import BackgroundExecutor
+from ir_msgs_py.ros.spinning import BackgroundExecutor, Cancellation
 from ir_msgs_py.ros.topics import ACTION_SERVICES, SERVICE
 from ir_msgs_py.savings import ProgramPoint, ProgramSavings
 from ir_msgs_py.status import StatusCode
@@ -142,8 +142,6 @@ GONE = 10.0
 """s without anybody who offers an action before its goal is given up. The middleware forgets a
 process that died, or was stopped, after 5 s.
 """
-LOOK = 0.02
-"""s between two looks whether a goal is to be canceled."""
 
 
 class GoalSender:
@@ -162,10 +160,10 @@ class GoalSender:
         response_timeout: float,
         result_timeout: float,
         cancel_grace: float,
-        give_up: Callable[[], bool] | None = None,
+        give_up: Cancellation | None = None,
     ) -> Any:
         """Send the goal and return its result; cancel it on timeout [s], on an exception while
-        waiting, and when `give_up` says so: then the result is that of the canceled goal.
+        waiting, and when it is given up: then the result is that of the canceled goal.
         """
         action_type = owner_of(goal, "Goal", "action")
         client = self._executor.run(lambda: self._client(action, action_type))
@@ -184,9 +182,7 @@ class GoalSender:
             raise RequestRefusedError(f"{action} rejected the goal", int(StatusCode.FAILURE))
         result: Future = self._executor.run(handle.get_result_async)
         try:
-            if give_up is not None and not self._awaited(client, result, give_up):
-                self._executor.run(handle.cancel_goal_async)
-            if self._ended(action, client, result, result_timeout):
+            if self._ended(action, client, handle, result, result_timeout, give_up):
                 self._executor.run(
                     _nothing
                 )  # feedback that came with the result is called back after it
@@ -210,21 +206,25 @@ class GoalSender:
             client.destroy()
         self._clients.clear()
 
-    def _awaited(self, client: ActionClient, result: Future, give_up: Callable[[], bool]) -> bool:
-        """Whether the goal's result comes, or its node goes, before the goal is given up."""
-        while not self._executor.wait(result, LOOK) and client.server_is_ready():
-            if give_up():
-                return False
-        return True
-
-    def _ended(self, action: str, client: ActionClient, result: Future, timeout: float) -> bool:
-        """Whether the goal's result has come within `timeout` [s]; raises where its node has
-        gone.
+    def _ended(
+        self,
+        action: str,
+        client: ActionClient,
+        handle: Any,
+        result: Future,
+        timeout: float,
+        give_up: Cancellation | None,
+    ) -> bool:
+        """Whether the goal's result has come within `timeout` [s]; raises where its node has gone.
+        The goal is canceled when it is given up.
         """
         now = time.monotonic()
         deadline = now + timeout
         seen = now
-        while not self._executor.wait(result, min(0.1 * GONE, deadline - now)):
+        while not self._executor.wait(result, min(0.1 * GONE, deadline - now), give_up):
+            if give_up is not None and give_up.canceled:
+                self._executor.run(handle.cancel_goal_async)
+                give_up = None
             now = time.monotonic()
             if client.server_is_ready():
                 seen = now
@@ -408,12 +408,12 @@ class Client:
         service: str,
         request: Any,
         timeout: float | None = None,
-        give_up: Callable[[], bool] | None = None,
+        give_up: Cancellation | None = None,
     ) -> Any:
         """Send a request (a `SetCell.Request(...)`) and return the response.
 
-        give_up: asked meanwhile; when it is true, CallGivenUpError is raised, and a planner ends
-        what it plans for the call.
+        give_up: when it is canceled, CallGivenUpError is raised, and a planner ends what it plans
+        for the call.
 
         Raises ServiceUnavailableError or CallTimedOutError; the response's status is the caller's
         to read.
@@ -437,12 +437,12 @@ class Client:
         service: str,
         request: Any,
         limit: float,
-        give_up: Callable[[], bool] | None = None,
+        give_up: Cancellation | None = None,
     ) -> Any:
         """The response to a request of this client, within `limit` [s] in all."""
 
         def given_up() -> bool:
-            return give_up is not None and give_up()
+            return give_up is not None and give_up.canceled
 
         deadline = time.monotonic() + limit
         self._executor.wait_until(lambda: client.service_is_ready() or given_up(), limit)
@@ -454,14 +454,12 @@ class Client:
                 f"no node offers the service {service} (waited {limit:g} s){other}"
             )
         future: Future = self._executor.run(lambda: client.call_async(request))
-        look = float("inf") if give_up is None else LOOK
-        while not self._executor.wait(future, min(look, max(0.0, deadline - time.monotonic()))):
-            if given_up():
-                raise CallGivenUpError(f"the call of {service} was given up")
-            if time.monotonic() >= deadline:
-                self._executor.run(lambda: client.remove_pending_request(future))
-                raise CallTimedOutError(f"{service} did not answer within {limit:g} s")
-        return future.result()
+        if self._executor.wait(future, max(0.0, deadline - time.monotonic()), give_up):
+            return future.result()
+        if given_up():
+            raise CallGivenUpError(f"the call of {service} was given up")
+        self._executor.run(lambda: client.remove_pending_request(future))
+        raise CallTimedOutError(f"{service} did not answer within {limit:g} s")
 
     def ask(self, service: str, request: Any, timeout: float | None = None) -> Any:
         """Like `call`, and raise RequestRefusedError with the sentence of a status that is not
@@ -477,13 +475,12 @@ class Client:
         goal: Any,
         feedback: Callable[[Any], object] | None = None,
         timeout: float = float("inf"),
-        give_up: Callable[[], bool] | None = None,
+        give_up: Cancellation | None = None,
     ) -> Any:
         """Send a goal (a `RunProgram.Goal(...)`) and return its result; Ctrl-C cancels the goal.
 
         timeout: for the result [s]; the goal is canceled when it is over and CallTimedOutError
-        raised. give_up: asked meanwhile; when it is true the goal is canceled, and its result
-        returned.
+        raised. give_up: when it is canceled, so is the goal, and its result returned.
         """
         return self._goals.send(
             action, goal, feedback, self.timeout, timeout, _CANCEL_GRACE, give_up
@@ -611,10 +608,10 @@ class Client:
         program: str | Sequence[PlannedMovement],
         progress: Callable[[RunProgram.Feedback], object] | None = None,
         timeout: float = float("inf"),
-        give_up: Callable[[], bool] | None = None,
+        give_up: Cancellation | None = None,
     ) -> ProgramRun:
         """Run a planned program, by its id or its steps; progress gets the action's feedback.
-        give_up: asked meanwhile; when it is true the program is canceled, which is a refusal.
+        give_up: when it is canceled, so is the program, which is a refusal.
         """
         if isinstance(program, str):
             goal = RunProgram.Goal(program_id=program)

@@ -1,4 +1,5 @@
-"""Executors that spin until they are ended: in the calling thread, or in one of their own.
+"""Executors that spin until they are ended: in the calling thread, or in one of their own; and what
+ends a wait for their answers.
 
 Entities of a node that spins in the background are only touched by `run`: clients, and action
 clients above all, race when they are used from two threads.
@@ -8,7 +9,8 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TypeVar
 
 from rclpy.context import Context
@@ -26,6 +28,7 @@ from ir_msgs_py.ros.rclpy_inside import RCLError, survive_clients
 T = TypeVar("T")
 LOOK = 0.1  # s between two looks whether a node goes on
 _POLL = 0.005  # s, for conditions that nobody announces, as the discovery of a service
+_SLICE = 0.1  # s of a wait between two looks whether a callback has failed
 _LAST_CALLBACK = 60.0  # s that it may take; nodes are not taken apart under it
 
 
@@ -66,6 +69,49 @@ class Spinning:
             executor.create_task(_nothing)  # waking alone does not end a wait, work does
 
 
+class Cancellation:
+    """Whether what is waited for is not wanted any more: canceled once, by any thread, which ends
+    the waits for it at that moment.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._canceled = False
+        self._callbacks: list[Callable[[], object]] = []
+
+    @property
+    def canceled(self) -> bool:
+        """Whether `cancel` was called."""
+        return self._canceled
+
+    def cancel(self) -> None:
+        """Cancel it, and end the waits; a second time is nothing."""
+        with self._lock:
+            self._canceled = True
+            callbacks = self._callbacks
+            self._callbacks = []
+        for callback in callbacks:
+            callback()
+
+    @contextmanager
+    def calling(self, callback: Callable[[], object]) -> Iterator[None]:
+        """Meanwhile call back when it is canceled, from the thread that cancels it; at once where
+        it is already.
+        """
+        with self._lock:
+            before = self._canceled
+            if not before:
+                self._callbacks.append(callback)
+        if before:
+            callback()
+        try:
+            yield
+        finally:
+            with self._lock:
+                if callback in self._callbacks:
+                    self._callbacks.remove(callback)
+
+
 class BackgroundExecutor:
     """Spins the nodes of one context until it is closed; also a context manager.
 
@@ -102,17 +148,18 @@ class BackgroundExecutor:
         """Let the spinning thread call the function; nobody waits for it."""
         self._executor.create_task(function)
 
-    def wait(self, future: Future, timeout: float) -> bool:
-        """Wait until the future is done; False after `timeout` [s]."""
-        done = threading.Event()
-        future.add_done_callback(lambda _: done.set())
+    def wait(self, future: Future, timeout: float, given_up: Cancellation | None = None) -> bool:
+        """Wait until the future is done; False after `timeout` [s], or where it is given up."""
+        ended = threading.Event()
+        future.add_done_callback(lambda _: ended.set())
         deadline = time.monotonic() + timeout
-        # in slices, so that a failed callback ends the wait as well
-        while not (future.done() or done.wait(min(0.1, max(0.0, deadline - time.monotonic())))):
-            self._raise_failure()
-            if time.monotonic() >= deadline:
-                return False
-        return True
+        with (given_up or Cancellation()).calling(ended.set):
+            # in slices, so that a failed callback ends the wait as well
+            while not ended.wait(min(_SLICE, max(0.0, deadline - time.monotonic()))):
+                self._raise_failure()
+                if time.monotonic() >= deadline:
+                    break
+        return future.done()
 
     def wait_until(self, condition: Callable[[], bool], timeout: float) -> bool:
         """Wait until the condition holds; False after `timeout` [s]."""

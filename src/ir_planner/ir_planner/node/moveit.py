@@ -11,10 +11,12 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
 import numpy as np
+from rclpy.action import CancelResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.executors import MultiThreadedExecutor
@@ -42,6 +44,7 @@ from ir_msgs_py.ros.conversions import (
 from ir_msgs_py.ros.node_process import run_node
 from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.ros.serving import ANY, BoundedService, RecordedActionServer, unexpected
+from ir_msgs_py.ros.spinning import Cancellation
 from ir_msgs_py.ros.topics import ACTION_SERVICES, LATCHED, LatestMessage
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.errors import PlannerError, RequestError
@@ -50,7 +53,6 @@ from ir_planner.node.inputs import LastState, has_joints, measured_velocity, of_
 from ir_planner.node.moveit_actions import (
     EXECUTE,
     MOVE,
-    Canceled,
     MoveAction,
     TrajectoryExecution,
     other_controller,
@@ -83,6 +85,7 @@ from ir_values.errors import (
 _THREADS = 8  # long and quick requests, scenes, topics, two goals, cancelling, a spare
 _GOALS_WAITING = 100  # of an action; beyond, a client is in a loop
 _PATIENCE = 10.0  # s for an answer beside the planning time
+_MOMENT = 1e-3  # s between two looks
 _PAIRS = 20  # of a state that are looked at
 _ROBOT_LINK, _WORLD_OBJECT, _ATTACHED = range(3)  # of moveit_msgs/ContactInformation
 
@@ -90,8 +93,8 @@ _ROBOT_LINK, _WORLD_OBJECT, _ATTACHED = range(3)  # of moveit_msgs/ContactInform
 class PlannerAnswers:
     """MoveIt's requests answered by the planner; messages are read and written by their fields.
 
-    ask: calls a service of the planner: name, request, timeout [s], and where it may be canceled
-    whether it is; CallGivenUpError ends it then. state: the joints (n,) where
+    ask: calls a service of the planner: name, request, timeout [s], and what may cancel it;
+    CallGivenUpError ends it then. state: the joints (n,) where
     the robot is, for these names. report: takes the planner's report of a movement, its start state
     and its trajectory. contact: makes a ContactInformation.
     """
@@ -141,7 +144,7 @@ class PlannerAnswers:
         code = StatusCode.INVALID_MOTION_PLAN
         check_near(q, self._state(joints), joints, "the first point", code)
 
-    def plan(self, request: Any, response: Any, canceled: Canceled | None = None) -> Status:
+    def plan(self, request: Any, response: Any, canceled: Cancellation | None = None) -> Status:
         """GetMotionPlan."""
         given = request.motion_plan_request
         answer = response.motion_plan_response
@@ -390,6 +393,14 @@ def set_planner_params(request: Any, response: Any) -> Status:
     return Status.success("nothing was set")
 
 
+@dataclass(eq=False)
+class _Accepted:
+    """A goal that is accepted and has not ended: what cancels it, and whether its client does."""
+
+    stopped: Cancellation
+    by_client: bool = False
+
+
 class MoveItNode(Node):
     """Serves MoveIt's services and actions. Raises IrError where moveit_msgs is missing."""
 
@@ -487,24 +498,25 @@ class MoveItNode(Node):
     def _offer_action(self, kind: str, run: Callable[..., Status]) -> RecordedActionServer:
         """Serve an action of moveit_msgs: its goals are carried out one after the other."""
         action_type = getattr(import_module("moveit_msgs.action"), kind)
-        watches: dict[ServerGoalHandle, Canceled] = {}
+        accepted: dict[bytes, _Accepted] = {}
 
         def execute(goal: ServerGoalHandle) -> Any:
-            stopped = watches.pop(goal)
+            one = accepted[_key(goal)]
 
             def feedback(state: str) -> None:
                 goal.publish_feedback(action_type.Feedback(state=state))
 
             def work(request: Any, result: Any) -> Status:
-                return run(request, result, stopped, feedback)
+                return run(request, result, one.stopped, feedback)
 
             result = self._guarded(ACTIONS[kind], work)(goal.request, action_type.Result())
             feedback("IDLE")
-            _end(goal, result.error_code.val)
+            del accepted[_key(goal)]
+            _end(goal, result.error_code.val, one)
             return result
 
         def refuse(goal: ServerGoalHandle) -> Any:
-            del watches[goal]
+            del accepted[_key(goal)]
             result = action_type.Result()
             sentence = f"{_GOALS_WAITING} goals of {ACTIONS[kind]} wait already"
             put_error_code(result, Status(StatusCode.FAILURE, sentence, self.get_name()))
@@ -513,23 +525,30 @@ class MoveItNode(Node):
 
         goals = GoalQueue(execute, refuse, _GOALS_WAITING)
 
-        def accepted(goal: ServerGoalHandle) -> None:
-            watches[goal] = self._executor.watched(lambda: bool(goal.is_cancel_requested))
+        def accept(goal: ServerGoalHandle) -> None:
+            accepted[_key(goal)] = _Accepted(self._executor.accept())
             goals.accepted(goal)
+
+        def cancel(goal: ServerGoalHandle) -> CancelResponse:
+            one = accepted.get(_key(goal))
+            if one is not None:
+                one.by_client = True
+                one.stopped.cancel()
+            return goals.cancel(goal)
 
         return RecordedActionServer(
             self,
             action_type,
             ACTIONS[kind],
             goals.execute,
-            handle_accepted_callback=accepted,
-            cancel_callback=goals.cancel,
+            handle_accepted_callback=accept,
+            cancel_callback=cancel,
             callback_group=ReentrantCallbackGroup(),
             **ACTION_SERVICES,
         )
 
     def _execute(
-        self, goal: Any, result: Any, stopped: Canceled, feedback: Callable[[str], None]
+        self, goal: Any, result: Any, stopped: Cancellation, feedback: Callable[[str], None]
     ) -> Status:
         """ExecuteTrajectory."""
         other = other_controller(goal.controller_names, self._settings.value.controller)
@@ -538,7 +557,7 @@ class MoveItNode(Node):
         feedback("MONITOR")
         return self._executor.drive(goal.trajectory, stopped)
 
-    def _drive(self, goal: Any, stopped: Callable[[], bool]) -> Any:
+    def _drive(self, goal: Any, stopped: Cancellation) -> Any:
         return self._client.send_goal(self._settings.value.controller, goal, give_up=stopped)
 
     def _guarded(self, name: str, handler: Callable[[Any, Any], Status]) -> Callable[..., Any]:
@@ -597,11 +616,18 @@ class MoveItNode(Node):
         look()
 
 
-def _end(goal: ServerGoalHandle, code: int) -> None:
+def _key(goal: ServerGoalHandle) -> bytes:
+    """What tells a goal from others; its handle has no hash."""
+    return bytes(goal.goal_id.uuid)
+
+
+def _end(goal: ServerGoalHandle, code: int, one: _Accepted) -> None:
     """End a goal as MoveIt does: succeeded, canceled where its client asked for it, aborted."""
     if code == StatusCode.SUCCESS:
         goal.succeed()
-    elif goal.is_cancel_requested:
+    elif one.by_client:
+        while not goal.is_cancel_requested:  # rclpy says so just after the callback of the cancel
+            time.sleep(_MOMENT)
         goal.canceled()
     else:
         goal.abort()

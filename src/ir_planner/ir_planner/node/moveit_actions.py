@@ -7,8 +7,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib import import_module
+from threading import Lock
 from typing import Any
+from weakref import WeakSet
 
+from ir_msgs_py.ros.spinning import Cancellation
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.node.moveit_scene import refusal
 from ir_values.errors import CallGivenUpError, IrError, shown
@@ -19,7 +22,6 @@ STOP = "stop"
 _SUCCESSFUL = 0  # of control_msgs/FollowJointTrajectory
 _REFUSED = (-1, -2, -3)  # there: the goal, its joints, its stamp
 _CONTROL_FAILED = -4  # of moveit_msgs/MoveItErrorCodes
-Canceled = Callable[[], bool]
 Feedback = Callable[[str], None]
 
 
@@ -37,24 +39,28 @@ def follow_goal() -> Any:
 class TrajectoryExecution:
     """Lets the controller drive a trajectory.
 
-    send: sends a goal and waits for its result; the second argument says when it is canceled.
+    send: sends a goal and waits for its result, and cancels it when the second argument is.
     check_begin: refuses a trajectory that does not begin where the robot is.
 
     A controller's goals can't name the driver's stop that their sender knows, so what is heard of
-    stops ends here all that was accepted before, whether it waits, is planned or is driven.
+    stops cancels here all that was accepted before, whether it waits, is planned or is driven.
     """
 
     def __init__(
-        self, send: Callable[[Any, Canceled], Any], check_begin: Callable[[Any], None]
+        self, send: Callable[[Any, Cancellation], Any], check_begin: Callable[[Any], None]
     ) -> None:
         self._send = send
         self._check_begin = check_begin
-        self._stops = 0
+        self._lock = Lock()
+        self._accepted: WeakSet[Cancellation] = WeakSet()
         self._heard: dict[str, int] = {}
 
     def stop(self) -> None:
         """Stop what is driven now, along its path, and drive nothing that was accepted before."""
-        self._stops += 1
+        with self._lock:
+            accepted = list(self._accepted)
+        for each in accepted:
+            each.cancel()
 
     def hear(self, topic: str, value: int) -> None:
         """A topic of the driver that tells a stop or a recovery by another value."""
@@ -62,12 +68,14 @@ class TrajectoryExecution:
             self._heard[topic] = value
             self.stop()
 
-    def watched(self, canceled: Canceled) -> Canceled:
-        """Whether a goal that is accepted now is canceled, or all are stopped."""
-        before = self._stops
-        return lambda: canceled() or self._stops != before
+    def accept(self) -> Cancellation:
+        """What cancels a goal that is accepted now: its client, or a stop of all."""
+        accepted = Cancellation()
+        with self._lock:
+            self._accepted.add(accepted)
+        return accepted
 
-    def drive(self, trajectory: Any, stopped: Canceled) -> Status:
+    def drive(self, trajectory: Any, stopped: Cancellation) -> Status:
         """Drive a moveit_msgs/RobotTrajectory to its end."""
         if trajectory.multi_dof_joint_trajectory.points:
             raise refusal(
@@ -78,10 +86,10 @@ class TrajectoryExecution:
         if not trajectory.joint_trajectory.points:
             return Status.success("a trajectory without points: nothing was driven")
         self._check_begin(trajectory.joint_trajectory)
-        if stopped():
+        if stopped.canceled:
             return Status(StatusCode.PREEMPTED, "stopped before it was driven")
         result = self._send(follow_goal()(trajectory=trajectory.joint_trajectory), stopped)
-        if stopped():
+        if stopped.canceled:
             said = f": {result.error_string}" if result.error_string else ""
             return Status(StatusCode.PREEMPTED, f"stopped along the path{said}")
         if result.error_code != _SUCCESSFUL:
@@ -93,17 +101,17 @@ class TrajectoryExecution:
 
 @dataclass(frozen=True)
 class MoveAction:
-    """The action MoveGroup. plan: GetMotionPlan, from its request and response, and whether it is
-    canceled, to a status; new: the two, empty. check_start: refuses a state that is given and is
+    """The action MoveGroup. plan: GetMotionPlan, from its request and response, and what cancels
+    it, to a status; new: the two, empty. check_start: refuses a state that is given and is
     not the robot's.
     """
 
-    plan: Callable[[Any, Any, Canceled], Status]
+    plan: Callable[[Any, Any, Cancellation], Status]
     new: Callable[[], tuple[Any, Any]]
     check_start: Callable[[Any], None]
     executor: TrajectoryExecution
 
-    def run(self, goal: Any, result: Any, stopped: Canceled, feedback: Feedback) -> Status:
+    def run(self, goal: Any, result: Any, stopped: Cancellation, feedback: Feedback) -> Status:
         """Plan, and where it is asked for, execute from where the robot is."""
         options = goal.planning_options
         _check_diff(options.planning_scene_diff)
