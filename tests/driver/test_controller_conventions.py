@@ -72,7 +72,8 @@ def test_lines_are_driven_within_limits_past_every_point(cell, dynamics, home, s
     assert np.array_equal(executed.positions[-1], q[-1])
     passed = [np.abs(spline(dense) - point).max(axis=1).min() for point in q]
     resolution = np.abs(np.diff(spline(dense), axis=0)).max()
-    assert max(passed[1:]) <= SETTINGS.corner_tolerance + resolution
+    assert max(passed) <= SETTINGS.corner_tolerance + resolution
+    assert np.abs(executed.positions[0] - q[0]).max() <= SETTINGS.corner_tolerance + 1e-9
     shortest = (t[-1] - t[0]) >= (times[-1] - times[0]) - 1e-9
     assert shortest, "it is never faster than sent"
     if "slowed" not in note:
@@ -104,6 +105,20 @@ def test_lines_that_are_too_fast_are_slowed_and_absurd_ones_refused(
         TrajectoryRefusedError, match=r"times slower to keep the limits: at most 10"
     ):
         start(simulation, plan([1.0, 1.01, 1.02], home, there, home, velocities=False))
+
+
+@pytest.mark.parametrize(("speed", "moving"), [(0.2, True), (2.0, False)])
+def test_a_first_point_at_a_later_time_is_met_in_motion_where_that_takes_no_run_up(
+    cell, dynamics, plan, home, speed, moving
+):
+    """Else in rest: what leads in does not begin far before the point, out of the script's way."""
+    turned = home + speed * np.array([0.5, 0.0, 0.0, 0.0, 0.0, 0.0])
+    sent = plan([6.0, 6.5], home, turned, velocities=False)
+    executed, _ = check_trajectory(sent, cell.robot, dynamics, SETTINGS)
+    assert bool(executed.velocities[0].any()) is moving
+    begun = np.abs(executed.positions[0] - home).max()
+    assert (0.0 < begun <= SETTINGS.corner_tolerance) if moving else begun == 0.0
+    assert np.array_equal(executed.positions[-1], turned)
 
 
 @pytest.mark.parametrize("times", [[0.0, 1e-9, 3600.0], [0.0, 3599.0, 3599.000000001]])

@@ -65,8 +65,9 @@ def rounded(
 ) -> Rounded:
     """Several positions (N, n) within the robot's velocities and a share of its accelerations.
 
-    It ends a window later. Before a first time 0 the robot rests; before a later one the mean
-    continues the first line, so that what leads in meets it in motion.
+    It ends a window later. Before a first time 0 the robot rests. Before a later one the mean
+    continues the first line, so that what leads in meets it in motion; where that would begin
+    farther before the first point than `corner_tolerance`, the robot rests there too.
     """
     speed = np.abs(_slopes(trajectory)) / (robot.velocity_max * _WITHIN)
     slowed = max(1.0, float(speed.max()))
@@ -78,8 +79,12 @@ def rounded(
         if slowed > SLOWEST:  # nobody drives it
             break
         slow = _stretched(trajectory, slowed)
-        window = _window(slow, most, settings.blend_time)
-        executed = _mean(slow, window)
+        moving = slow.times_ns[0] > 0
+        window = _window(slow, most, settings.blend_time, moving)
+        if moving and _run_up(slow, window) > settings.corner_tolerance:
+            moving = False
+            window = _window(slow, most, settings.blend_time, moving)
+        executed = _mean(slow, window, moving)
         passed = _passed(slow, executed, window)
         if passed <= settings.corner_tolerance or window <= settings.blend_time:
             break
@@ -101,13 +106,18 @@ def _stretched(trajectory: JointTrajectory, factor: float) -> JointTrajectory:
     return JointTrajectory(trajectory.joint_names, times, trajectory.positions)
 
 
-def _window(trajectory: JointTrajectory, most: FloatArray, least: float) -> float:
+def _run_up(trajectory: JointTrajectory, window: float) -> float:
+    """How far before the first point the mean over a window [s] begins in motion [rad]."""
+    return 0.5 * window * float(np.abs(_slopes(trajectory)[0]).max())
+
+
+def _window(trajectory: JointTrajectory, most: FloatArray, least: float, moving: bool) -> float:
     """The shortest window [s], at least `least`, over which no velocity changes by more than its
-    limit `most` (n,) [rad/s^2] allows.
+    limit `most` (n,) [rad/s^2] allows; moving: it begins in motion.
     """
     slopes = _slopes(trajectory)
     still = np.zeros((1, slopes.shape[1]))
-    before = still if trajectory.times_ns[0] == 0 else slopes[:1]
+    before = slopes[:1] if moving else still
     # velocity i holds from ends[i] to ends[i + 1] [s]: what leads in, the lines, rest
     velocities = np.concatenate((before, slopes, still))
     ends = np.concatenate(([-np.inf], trajectory.times_ns / NS_PER_S, [np.inf]))
@@ -127,15 +137,15 @@ def _window(trajectory: JointTrajectory, most: FloatArray, least: float) -> floa
     return window
 
 
-def _mean(trajectory: JointTrajectory, window: float) -> JointTrajectory:
-    """The mean of the lines over a window [s], with its velocities."""
+def _mean(trajectory: JointTrajectory, window: float, moving: bool) -> JointTrajectory:
+    """The mean of the lines over a window [s], with its velocities; moving: it begins in motion."""
     window_ns = round(window * NS_PER_S)
     given = trajectory.times_ns
     knots = np.unique(np.concatenate((given, given + window_ns)))
     first = int(given[0])
     t = (given - first) / NS_PER_S
     q = trajectory.positions
-    start = q[0] if first == 0 else q[0] - (q[1] - q[0]) / t[1] * window
+    start = q[0] - (q[1] - q[0]) / t[1] * window if moving else q[0]
     t = np.concatenate(([-window], t, [t[-1] + window]))
     at = (knots - first) / NS_PER_S
     corners = np.vstack((start, q, q[-1]))

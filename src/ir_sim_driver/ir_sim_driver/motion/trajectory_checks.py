@@ -318,15 +318,19 @@ def _path(coefficients: list[FloatArray], durations: list[FloatArray], rest: Flo
 
 
 def _motion_at_point(trajectory: JointTrajectory, k: int) -> Motion:
-    """Motion right after point k; what a trajectory does not say comes from its own polynomial."""
+    """Motion right after point k; what a trajectory does not say comes from its own polynomial. At
+    rest there is no acceleration but what it says: to meet that of a polynomial, what leads there
+    would swing back, the farther the longer it lasts.
+    """
     samples = trajectory.sample(trajectory.times[k : k + 1])
     last = k == len(trajectory.times_ns) - 1
     still = np.zeros(samples.q.shape[1])
     v = samples.qd[0] if trajectory.velocities is None else trajectory.velocities[k]
     a = samples.qdd[0] if trajectory.accelerations is None else trajectory.accelerations[k]
-    if last:  # the robot rests there
-        v = still if trajectory.velocities is None else v
-        a = still if trajectory.accelerations is None else a
+    if last and trajectory.velocities is None:
+        v = still
+    if trajectory.accelerations is None and not v.any():
+        a = still
     return Motion(trajectory.positions[k], v, a)
 
 
