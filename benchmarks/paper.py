@@ -65,12 +65,12 @@ shares that never vary) keeps its bound, it **does not hold** where none of the 
 it cannot be decided either, and the row says so, and how much larger a sample would decide it if the figure
 stays. `measured` claims nothing; `calibration` is no evidence, the data were made to fit. All energies are
 predicted by the planner's model of robot and drives, no robot was measured; times are processor
-times{machine}.
+times{machine} where a chapter names no other machine.
 
 How large the samples are follows from pilots with seeds 0 to 5, whose draws are not used here (the bundled
 cells themselves, which the drawn ones vary, are the same for every seed): where an interval was too wide to
 decide, the sample grew with the square of its width over its distance to the bound, on whichever side of it
-the figure was, as far as an hour of processor time for all claims allows. What is drawn independently are
+the figure was, as far as about an hour of processor time for all claims allows. What is drawn independently are
 cells and movements, not the searches in them. Every interval is one of 95 % by itself, and there are many:
 that is why each seed must say the same alone, so that chance has to deceive twice for a wrong verdict. An
 interval says what another draw would change, not what another machine would, or what else runs on it: the
@@ -81,7 +81,7 @@ ratio of two times of milliseconds can move further than that.
 @dataclass(frozen=True, eq=False)
 class Chapter:
     """An experiment with what it found; picture: relative to the page, "" for none; seconds: of
-    processor.
+    processor; machine: where it was measured, "" where the page's head says it.
     """
 
     experiment: Experiment
@@ -89,6 +89,7 @@ class Chapter:
     rows: list[Row]
     picture: str
     seconds: float
+    machine: str = ""
 
 
 @dataclass(frozen=True)
@@ -117,6 +118,13 @@ def kept_chapters(file: Path, seeds: Sequence[int]) -> dict[str, Kept]:
         if seconds is not None:
             found[title] = Kept(line, f"## {body}\n", float(seconds[1]))
     return found
+
+
+def kept_machine(file: Path) -> str:
+    """Where the chapters of a page that name no machine were measured; "" where it doesn't say."""
+    text = file.read_text("utf-8") if file.exists() else ""
+    found = re.search(r"^times on (.*) where a chapter", text, re.MULTILINE)
+    return found[1] if found else ""
 
 
 def _named(seeds: Sequence[int]) -> str:
@@ -176,8 +184,11 @@ def _chapter(chapter: Chapter) -> str:
         }
         for one in chapter.statements
     ]
+    asked = experiment.asked
+    if chapter.machine:
+        asked += f" Processor times are those of {chapter.machine}."
     lines = [f"## {experiment.title}", "", f"**The paper.** {experiment.paper}", ""]
-    lines += [f"**Experiment** (`{experiment.name}`). {experiment.asked}", "", table(rows), ""]
+    lines += [f"**Experiment** (`{experiment.name}`). {asked}", "", table(rows), ""]
     for title, more in experiment.tables(chapter.rows).items():
         lines += [f"{title}:", "", table(more), ""]
     if chapter.picture:
@@ -388,15 +399,24 @@ def origin(experiment: Experiment, given: argparse.Namespace, kept: Container[st
     return "as the page has it" if experiment.title in kept else "not run"
 
 
-def chapter(experiment: Experiment, found: dict[str, Any], images: Path, folder: Path) -> Chapter:
-    """Judge what was stored, and draw it."""
+def chapter(
+    experiment: Experiment, found: dict[str, Any], images: Path, folder: Path, others: str
+) -> Chapter:
+    """Judge what was stored, and draw it; others: the machine that the page's head names."""
     rows: list[Row] = found["rows"]
     picture = ""
     if experiment.draw is not None:
         file = images / f"paper_{experiment.name}.png"
         experiment.draw(rows, file)
         picture = file.relative_to(folder).as_posix()
-    return Chapter(experiment, judged(experiment, rows), rows, picture, found["processor_s"])
+    own = machine_of(found)
+    where = "" if own == others else own
+    return Chapter(experiment, judged(experiment, rows), rows, picture, found["processor_s"], where)
+
+
+def machine_of(found: dict[str, Any]) -> str:
+    """Where it was measured, without the load of that moment."""
+    return str(found["machine"].split(", load")[0])
 
 
 def claims_of(statements: Sequence[Statement]) -> list[Claim]:
@@ -418,21 +438,21 @@ def main() -> None:
             print(f"{name}: {origin(one, given, kept)}", flush=True)
     run_all(asked, given)
     folder = given.page.parent
-    there = {}
+    there = {name: stored(one, given) for name, one in EXPERIMENTS.items()}
+    usual = kept_machine(given.page) if kept else ""
+    usual = usual or ", ".join(sorted({machine_of(one) for one in there.values() if one}))
     shown: list[Chapter | Kept] = []
     left = []
     for name, one in EXPERIMENTS.items():
-        found = stored(one, given)
+        found = there[name]
         if found is not None:
-            there[name] = found
-            shown.append(chapter(one, found, folder / "images", folder))
+            shown.append(chapter(one, found, folder / "images", folder, usual))
         elif one.title in kept:
             shown.append(kept[one.title])
         else:
             left.append(name)
     chapters = [one for one in shown if isinstance(one, Chapter)]
-    machines = {found["machine"].split(", load")[0] for found in there.values()}
-    text = page(shown, left, seeds_of(given), ", ".join(sorted(machines)), given.quick)
+    text = page(shown, left, seeds_of(given), usual, given.quick)
     write(text, given.page)
     claims = []
     rows = []

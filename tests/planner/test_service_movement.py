@@ -35,6 +35,7 @@ from ir_planner.service.stochastic_withdrawal import (
     step_weights,
     withdraw,
 )
+from ir_values.arrays import FloatArray
 
 IN_ZONES = [
     ("cnc_door", "cnc"),
@@ -136,13 +137,111 @@ def alone(walker: _Walker, total: float = 1.0, sigma: float = 0.2) -> ExitPopula
     )
 
 
+@pytest.mark.parametrize("first", [1.0, 2.5])
 def test_the_spread_of_eq_7_shrinks_with_the_relative_gain_of_d_and_grows_where_d_was_lost(
-    walker: _Walker,
+    walker: _Walker, first: float
 ) -> None:
-    total = np.array([0.0, 0.9, 1.0, 1.1, 1.25, 3.0])
+    total = first * np.array([0.0, 0.9, 1.0, 1.1, 1.25, 3.0])
     q = np.repeat(walker.nodes[0][None], len(total), axis=0)
-    children = walker._children(alone(walker), q, np.zeros(len(q), dtype=np.int64), total)
+    children = walker._children(alone(walker, first), q, np.zeros(len(q), dtype=np.int64), total)
     assert children.sigma == pytest.approx([0.26, 0.24, 0.2, 0.16, 0.1, 0.05])
+
+
+@pytest.mark.parametrize(("sigma", "total", "after"), [(0.9, 0.0, 1.0), (0.02, 3.0, 0.01)])
+def test_the_spread_of_eq_7_stays_within_its_bounds(
+    walker: _Walker, sigma: float, total: float, after: float
+) -> None:
+    q = walker.nodes[0][None]
+    parents = alone(walker, sigma=sigma)
+    children = walker._children(parents, q, np.zeros(1, dtype=np.int64), np.array([total]))
+    assert children.sigma == pytest.approx([after])
+
+
+@pytest.mark.parametrize("reading", ["guided", "printed"])
+def test_eq_7_begins_with_copies_of_the_grasp_drawn_as_it_is_read(
+    demo_scene: PlanningScene, monkeypatch: pytest.MonkeyPatch, reading: str
+) -> None:
+    problem = problem_at(demo_scene, "lathe_work", a_budget())
+    chosen = ModifiedGa(reading=reading, spread=0.3, generations=1)
+    walker = _Walker(problem, chosen, np.random.default_rng(3))
+    drawn: dict[str, Any] = {}
+
+    def copies(name: str) -> Any:
+        def perturb(parents: ExitPopulation, owner: Any) -> Any:
+            drawn[name] = parents
+            return parents.q[owner]
+
+        return perturb
+
+    monkeypatch.setattr(walker, "_guided", copies("guided"))
+    monkeypatch.setattr(walker, "_as_printed", copies("printed"))
+    walker.run(1)
+    assert list(drawn) == [reading]
+    first = drawn[reading]
+    assert np.array_equal(first.q, problem.interaction[None])
+    assert first.sigma == pytest.approx([0.3])
+    assert not first.step.any()
+    assert not first.stuck.any()
+    grasp = problem.area.total_distance(problem.interaction[None])
+    assert first.total == pytest.approx(grasp)
+    assert walker.first_total == pytest.approx(grasp[0])
+
+
+def test_offspring_beyond_a_limit_are_dropped_by_name(walker: _Walker) -> None:
+    joints = walker.scene.cell.robot.joint_names
+    q = np.repeat(walker.nodes[0][None], 2 * len(joints), axis=0)
+    each = np.arange(len(joints))
+    q[each, each] = walker.inside.high + 1e-3
+    q[len(joints) + each, each] = walker.inside.low - 1e-3
+    free, _, collided = walker._free(q, np.zeros(len(q), dtype=np.int64), 1)
+    assert len(free) == 0
+    assert collided.all()
+    assert walker.walk.rejected == {f"{name} beyond its limit": 2 for name in joints}
+
+
+def test_offspring_are_ranked_by_d_and_few_of_one_configuration_survive(
+    walker: _Walker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """D is the first joint here. Judge: a loop over the ranks."""
+    parents = alone(walker).of(np.zeros(16, dtype=np.int64))
+    rng = np.random.default_rng(0)
+    q = np.repeat(walker.nodes[0][None], 200, axis=0)
+    q[:, 0] += 1e-6 * rng.permutation(200)
+    owner = rng.integers(0, 5, 200)
+    monkeypatch.setattr(WorkArea, "total_distance", lambda area, q: q[:, 0])
+    monkeypatch.setattr(walker, "_guided", lambda parents, owner: q)
+    monkeypatch.setattr(walker, "_free", lambda *_: (q, owner, np.zeros(16, dtype=bool)))
+    children = walker._next(parents, 6)
+    survivors: list[int] = []
+    for k in np.argsort(-q[:, 0]):
+        if len(survivors) < 16 and sum(owner[j] == owner[k] for j in survivors) < 3:
+            survivors.append(k)
+    assert np.array_equal(children.q, q[survivors])
+
+
+@pytest.mark.parametrize("proved", [True, False])
+def test_only_what_has_no_free_offspring_looks_around_unless_no_step_is_proved(
+    walker: _Walker, monkeypatch: pytest.MonkeyPatch, proved: bool
+) -> None:
+    parents = alone(walker).of(np.zeros(3, dtype=np.int64))
+    q = np.repeat(walker.nodes[0][None], 2, axis=0)
+    owner = np.array([0, 2])
+    collided = np.array([False, True, False])
+    rows = np.arange(2 if proved else 0)
+    monkeypatch.setattr(walker, "_free", lambda *_: (q, owner, collided))
+    monkeypatch.setattr(walker, "_certified", lambda *_: rows)
+    monkeypatch.setattr(walker, "_finished", lambda children: children)
+    children = walker._next(parents, 6)
+    assert children.stuck.tolist() == ([False, False, True] if proved else [True, True, True])
+
+
+def test_the_search_of_eq_7_goes_on_until_the_paths_that_are_wanted_are_there(
+    scene_of: SceneOf,
+) -> None:
+    for wanted in (1, 3):
+        problem = problem_at(scene_of("cnc_door"), "press", a_budget())
+        walk = withdraw(problem, ModifiedGa(), np.random.default_rng(0), wanted)
+        assert len(walk.paths) >= wanted
 
 
 def test_where_all_offspring_collide_eq_7_looks_one_radian_around(
@@ -222,6 +321,70 @@ def test_eq_7_as_printed_draws_normal_steps_around_the_mean(
     assert drawn.mean(axis=0) == pytest.approx(0.0 if stuck else 1.7 * chosen.step, abs=unsure)
     assert drawn.std(axis=0) == pytest.approx(sigma, rel=0.03)
     assert np.corrcoef(drawn.T) == pytest.approx(np.eye(6), abs=0.05)
+
+
+def drawn_guided(
+    problem: Exit, growth: float, last: FloatArray, settings: ModifiedGa
+) -> FloatArray:
+    """q' - q (K, 6) of an offspring each of 20,000 copies of a configuration whose last step was
+    `last` and whose D is `growth` times the first.
+    """
+    walker = _Walker(problem, settings, np.random.default_rng(3))
+    count = 20_000
+    parents = ExitPopulation(
+        np.repeat(problem.interaction[None], count, axis=0),
+        np.full(count, growth * walker.first_total),
+        np.full(count, 0.2),
+        np.repeat(last[None], count, axis=0),
+        np.zeros(count, dtype=np.int64),
+        np.zeros(count, dtype=bool),
+    )
+    return walker._guided(parents, np.arange(count)) - problem.interaction
+
+
+def test_the_mean_of_eq_7_leads_out_along_the_tool_by_the_step(demo_scene: PlanningScene) -> None:
+    """Judge: where the tool goes by finite differences. Half of the mean is drawn on average."""
+    problem = problem_at(demo_scene, "lathe_work", a_budget())
+    chosen = ModifiedGa(momentum=0.0, step=0.12)
+    drawn = drawn_guided(problem, 1.0, np.zeros(6), chosen)
+    out = 2.0 * drawn.mean(axis=0) / 0.12  # per metre
+    share = 1e-5
+    begin, end = demo_scene.chain.tcp_poses(
+        np.stack([problem.interaction, problem.interaction + share * out])
+    )
+    moved = (end - begin) / share
+    assert begin[:3, :3].T @ moved[:3, 3] == pytest.approx([-1.0, 0.0, 0.0], abs=0.05)
+    assert np.abs(moved[:3, :3]).max() < 0.05
+
+
+def test_the_mean_of_eq_7_grows_with_d_and_follows_the_last_step(
+    demo_scene: PlanningScene,
+) -> None:
+    """Judge: half of grown ((1 - m/2) out + m/2 last), last as long as out, not weighted."""
+    problem = problem_at(demo_scene, "lathe_work", a_budget())
+    quiet = ModifiedGa(momentum=0.6, spread_decades=6.0, step=1.0)
+    step = np.array([0.3, -0.1, 0.2, 0.1, -0.2, 0.4])
+    straight = drawn_guided(problem, 1.0, np.zeros(6), replace(quiet, momentum=0.0))
+    out = 2.0 * straight.mean(axis=0)
+    last = step / np.linalg.norm(step) * np.linalg.norm(out)
+    for growth, grown in ((0.1, 0.25), (1.0, 1.0), (2.0, 2.0), (9.0, 4.0)):
+        drawn = drawn_guided(problem, growth, step, quiet)
+        expected = 0.5 * grown * (0.7 * out + 0.3 * last)
+        assert drawn.mean(axis=0) == pytest.approx(expected, abs=0.01 * max(grown, 1.0))
+        assert np.abs(drawn.mean(axis=0) - 0.5 * grown * out).max() > 0.03 * grown
+
+
+def test_the_spread_of_eq_7_is_weighted_and_of_several_decades(demo_scene: PlanningScene) -> None:
+    """Judge: the moments of W s 10^-U n, U uniform up to 1.5, n normal; one U for all joints."""
+    problem = problem_at(demo_scene, "lathe_work", a_budget())
+    drawn = drawn_guided(problem, 1.0, np.zeros(6), ModifiedGa(step=0.001))
+    load = sum(load.mass for load in demo_scene.loads)
+    noise = drawn / step_weights(demo_scene.cell.robot.link_mass, load, "literal")
+    decades = 3.0 * np.log(10.0)
+    assert noise.std(axis=0) == pytest.approx(0.2 * np.sqrt((1.0 - 1e-3) / decades), rel=0.05)
+    size = np.log10(np.linalg.norm(noise, axis=1))
+    assert np.percentile(size, 97) - np.percentile(size, 3) == pytest.approx(1.5, abs=0.3)
+    assert np.corrcoef(np.log(np.abs(noise).T))[0, 1] > 0.1
 
 
 @pytest.mark.parametrize(("cell", "station"), IN_ZONES)

@@ -162,7 +162,7 @@ def test_the_page_shows_verdict_interval_bound_and_what_is_missing() -> None:
     one = experiment(means)
     rows = [{"seed": 0, "x": 2.0}, {"seed": 0, "x": 2.5}]
     text = page(
-        [Chapter(one, judged(one, rows), rows, "", 60.0)],
+        [Chapter(one, judged(one, rows), rows, "", 60.0, "another machine")],
         ["other"],
         [2, 3],
         "a machine",
@@ -172,6 +172,8 @@ def test_the_page_shows_verdict_interval_bound_and_what_is_missing() -> None:
     assert "|  | 60 s |" in text
     assert "| it helps | how much | 2.25 [2, 2.5], 10 tasks | ≥ 1 | **holds** |" in text
     assert "[One claim](#one-claim)" in text
+    assert "times on a machine where a chapter names no other machine." in text
+    assert "Processor times are those of another machine." in text
     assert "Not run: `other`" in text
     assert number(math.nan) == "none"
     assert bound(statement(1.0, 1.0, 1.0, at_least=False, unit="%")) == "≤ 1 %"
