@@ -123,3 +123,23 @@ def test_files_that_are_too_small_or_would_meet_others_are_refused(tmp_path: Pat
     with pytest.raises(RecorderError, match=r"a_1\.mcap is there already"):
         check_free(tmp_path / "a.mcap", Split(duration=2.0))
     check_free(tmp_path / "a.mcap", Split())
+
+
+def test_overwrite_replaces_the_parts_of_its_own_recording_only(tmp_path: Path) -> None:
+    split = Split(duration=1.5)
+    mine = recorded(tmp_path / "mine.mcap", split, 13)
+    check_free(mine.path, split, overwrite=True)
+    other = recorded(tmp_path / "other.mcap", split, 14)
+    foreign = mine.paths[2]
+    foreign.write_bytes(other.paths[2].read_bytes())
+    with pytest.raises(RecorderError, match=r"mine_2\.mcap is no part of mine\.mcap"):
+        check_free(mine.path, split, overwrite=True)
+    foreign.write_text("my only copy")
+    with pytest.raises(RecorderError, match="is no part of"):
+        check_free(mine.path, split, overwrite=True)
+    foreign.unlink()
+    recorded(tmp_path / "mine_now.mcap", Split(), 15)  # no number: a recording of its own
+    check_free(mine.path, split, overwrite=True)
+    mine.path.unlink()
+    with pytest.raises(RecorderError, match="is no part of"):
+        check_free(mine.path, split, overwrite=True)

@@ -177,6 +177,52 @@ def test_a_full_disk_is_a_sentence_and_stays_one(
     RecordingWriter(tmp_path / "full.mcap").finish()
 
 
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_a_disk_that_is_full_after_the_header_leaves_what_was_there(
+    overwrite: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "shift.mcap"
+    if overwrite:
+        RecordingWriter(path).finish()
+    before = {each.name: each.read_bytes() for each in tmp_path.iterdir()}
+    writer = RecordingWriter(path, overwrite=overwrite)
+
+    def full(self: object, time: int, *rest: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("mcap.writer.Writer.add_attachment", full)
+        with pytest.raises(WriteError, match="No space left"):
+            writer.attach("cell.yaml", "application/yaml", b"name: here", 0)
+    assert {each.name: each.read_bytes() for each in tmp_path.iterdir()} == before
+
+
+def test_a_recording_settles_with_its_first_flush(tmp_path: Path) -> None:
+    path = RecordingWriter(tmp_path / "shift.mcap").finish().path
+    before = path.read_bytes()
+    writer = RecordingWriter(path, overwrite=True)
+    channel = writer.register("/joint_states", JOINT_STATE)
+    writer.write(channel, 1, b"\0\1\0\0")
+    assert path.read_bytes() == before
+    writer.flush()
+    assert path.read_bytes() != before
+    assert writer.finish().messages == 1
+    assert [each.name for each in tmp_path.iterdir()] == ["shift.mcap"]
+
+
+def test_a_link_over_a_missing_folder_is_named_with_the_folder(tmp_path: Path) -> None:
+    (tmp_path / "folder").symlink_to(tmp_path / "gone")
+    (tmp_path / "file.mcap").symlink_to(tmp_path / "gone" / "x.mcap")
+    for path in ("folder/a.mcap", "file.mcap"):
+        with pytest.raises(
+            RecorderError, match=r"no directory \S+/gone, to which a link"
+        ) as refused:
+            RecordingWriter(tmp_path / path)
+        assert "make it first" in str(refused.value)
+    with pytest.raises(RecorderError, match=r"no directory \S+/nowhere; make it first"):
+        RecordingWriter(tmp_path / "nowhere" / "a.mcap")
+
+
 def test_a_full_disk_leaves_the_recording_that_was_to_be_replaced(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -306,8 +306,8 @@ class RecorderNode(Node):
         def open_file(path: str | Path) -> RecordingWriter:
             return self._open_writer(str(path), asked.overwrite, asked.roots)
 
-        if asked.split is not None and not asked.overwrite:
-            check_free(path, asked.split)
+        if asked.split is not None:
+            check_free(path, asked.split, asked.overwrite)
         facts = self._settings.named_facts
         session = RecordingSession(open_file(path), facts, self._now(), asked.split, open_file)
         self._recording = RecordingWorker(session, self._settings.queue_megabytes * 1_000_000)

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import struct
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from glob import escape
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from pathlib import Path
+
+from mcap.exceptions import McapError
+from mcap.records import Chunk, Message, Metadata
+from mcap.stream_reader import StreamReader
 
 from ir_description import (
     DescriptionError,
@@ -24,17 +30,47 @@ from ir_recorder.format.contents import Split, part_facts, part_path
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.recording.arithmetic import arithmetic
 from ir_recorder.recording.writer import RecordingSummary, RecordingWriter, checked_path
-from ir_values.errors import InvalidValueError
+from ir_values.errors import FileRefusedError, InvalidValueError
 from ir_values.extensions import installed_extensions
+from ir_values.files import ANYWHERE
 
 # What a further file of a recording repeats, so that it can be read alone.
 
 
-def check_free(path: str | Path, split: Split) -> None:
-    """RecorderError where the second file of a recording would meet another one."""
-    second = part_path(checked_path(path), 1)
-    if split.wanted and second.exists():
-        raise RecorderError(f"{second} is there already; choose another path or set overwrite")
+def check_free(path: str | Path, split: Split, overwrite: bool = False) -> None:
+    """RecorderError where a further file of a recording would meet another one; with `overwrite`,
+    one that is no part of the recording that is replaced.
+    """
+    first = checked_path(path)
+    if not split.wanted:
+        return
+    replaced = recording_of(first) if overwrite else ""
+    for other in first.parent.glob(f"{escape(first.stem)}_*{first.suffix}"):
+        number = other.stem.removeprefix(f"{first.stem}_")
+        if not (number.isascii() and number.isdecimal()) or part_path(first, int(number)) != other:
+            continue
+        if not overwrite:
+            raise RecorderError(f"{other} is there already; choose another path or set overwrite")
+        if not replaced or recording_of(other) != replaced:
+            raise RecorderError(
+                f"{other} is no part of {first.name}: it is not replaced; choose another path"
+            )
+
+
+def recording_of(path: Path) -> str:
+    """The recording that a file is a part of, by the facts that it begins with; "" for a file that
+    is there without any, or not there.
+    """
+    try:
+        with ANYWHERE.open_to_read(path) as stream:
+            for record in StreamReader(stream).records:
+                if isinstance(record, Metadata) and record.name == contents.PARTS:
+                    return record.metadata.get(contents.RECORDING, "")
+                if isinstance(record, (Chunk, Message)):
+                    return ""
+    except (OSError, FileRefusedError, McapError, ValueError, struct.error):
+        return ""
+    return ""
 
 
 def continued_path(lost: Path) -> Path:

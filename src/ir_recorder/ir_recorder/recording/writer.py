@@ -54,7 +54,8 @@ class RecordingWriter:
     """One MCAP file being written; times are nanoseconds of the node's clock.
 
     Raises RecorderError when the file can't be opened, WriteError as soon as the storage refuses;
-    after a WriteError the writer is closed and further calls raise the same error again.
+    after a WriteError the writer is closed and further calls raise the same error again. The first
+    `flush` settles the file: one that fails before is deleted, and an older recording is kept.
     """
 
     def __init__(
@@ -80,7 +81,7 @@ class RecordingWriter:
         self._finished = False
         with self._storage():
             self._writer.start(profile="ros2", library="ir_recorder")
-            self._file.settle()  # a full disk shows at once
+            self._file.sync()  # a full disk shows at once
 
     @property
     def messages(self) -> int:
@@ -151,6 +152,8 @@ class RecordingWriter:
         with self._storage():
             self._writer.flush()  # type: ignore[no-untyped-call]
             self._check_there()
+            if not self._file.settled:
+                self._file.settle()
 
     def finish(self) -> RecordingSummary:
         """Writes indexes and statistics, puts all on the disk, and closes the file.
@@ -162,8 +165,8 @@ class RecordingWriter:
         if not self._finished:
             with self._storage():
                 self._writer.finish()  # type: ignore[no-untyped-call]
-                self._file.settle()
                 self._check_there()
+                self._file.settle()
                 self._file.check_bytes()
                 held = self._file.messages_on_disk()
                 if held != self._messages:
@@ -257,9 +260,11 @@ class RecordingFile:
         self._locks: list[FileLock] = []
         try:
             self._place = roots.inside(path)
-            if not self._place.parent.is_dir():
+            folder = self._place.parent
+            if not folder.is_dir():
+                link = "" if folder == path.parent else ", to which a link in it leads"
                 raise RecorderError(
-                    f"{path} can't be written: there is no directory {path.parent}; make it first"
+                    f"{path} can't be written: there is no directory {folder}{link}; make it first"
                 )
             self.stream = _SummedWriter(FileIO(self._opened(path, overwrite), "wb"))
         except FileRefusedError as error:
@@ -317,9 +322,16 @@ class RecordingFile:
         self._locks.append(FileLock(descriptor))
         return descriptor
 
+    @property
+    def settled(self) -> bool:
+        """Whether it stays, at its place."""
+        return self._new is None
+
     def is_there(self, descriptor: int | None = None) -> bool:
-        """Whether the place leads to the file (to that descriptor's) still."""
-        return self._leads(self._place, self.stream.fileno() if descriptor is None else descriptor)
+        """Whether its name leads to the file (to that descriptor's) still."""
+        return self._leads(
+            self._new or self._place, self.stream.fileno() if descriptor is None else descriptor
+        )
 
     @staticmethod
     def _leads(path: Path, descriptor: int) -> bool:
@@ -328,10 +340,14 @@ class RecordingFile:
         except (FileNotFoundError, NotADirectoryError):
             return False
 
-    def settle(self) -> None:
-        """Puts what was written so far on the disk, and in place of the older recording."""
+    def sync(self) -> None:
+        """Puts what was written so far on the disk."""
         self.stream.flush()
         os.fsync(self.stream.fileno())
+
+    def settle(self) -> None:
+        """Puts what was written so far on the disk, and in place of the older recording."""
+        self.sync()
         if self._new is not None and self._new != self._place:
             os.replace(self._new, self._place)
         self._new = None
