@@ -22,9 +22,8 @@ CELL = "open"
 AROUND = 0.03  # m that the straight movement keeps
 S_M = 0.02  # m
 REACH = (0.3, 2.0)  # rad: largest joint of a movement
-LEVEL_M = (
-    0.15  # m: height of the tool's end over its start from which on a movement lifts or lowers
-)
+# m: height of the tool's end over its start from which on a movement lifts or lowers
+LEVEL_M = 0.15
 DRAWN = (
     "half with the 155 kg tool and half empty; from a random configuration in a random "
     f"direction of the joint space, the joint that moves most by {REACH[0]:g} to {REACH[1]:g} rad"

@@ -20,9 +20,8 @@ from ir_planner.request.goals import Goal
 
 PLANNING_TIME = 1.0  # s
 ENDLESS = 100_000_000  # certified edges: more than the time holds
-UNHURRIED = (
-    60.0  # s: where ids are compared, so that the budget of work ends a search and never the clock
-)
+# s: where ids are compared, so that the budget of work ends a search and never the clock
+UNHURRIED = 60.0
 FIRST = "first feasible"  # how the note of the stage begins that knew the first free path
 NOTHING = "nothing free"
 

@@ -46,9 +46,8 @@ FULL = Excitation(seconds=180.0)
 QUICK = Excitation(seconds=25.0, postures=1)
 DRAWS = 200
 STEPPED = 1  # plants
-SETTLING = (
-    3.0  # s after a movement: a charge of 120 J goes to idle inverters and holding torque of 50 W
-)
+# s after a movement: a charge of 120 J goes to idle inverters and holding torque of 50 W
+SETTLING = 3.0
 STEPPED_WITHIN = 1.0  # % of the energy of a movement
 WINDOW = 0.1  # s: of the root mean square of the power's error
 # %

@@ -40,9 +40,8 @@ PAYLOADS = (25.0, 75.0, 155.0, 200.0)
 INSTANTS = 24
 THRESHOLD = 3.0
 _REFERENCE = 40.0  # deg C to which the friction of the data belongs
-_SURE = (
-    3.0  # times the spread of estimates over drawn plants, beyond the threshold: what surely shows
-)
+# times the spread of estimates over drawn plants, beyond the threshold: what surely shows
+_SURE = 3.0
 _HOLDS = 0.8
 _FIT = 0.2  # of the deviations of friction that a fit leaves
 _KINDS = {"A1": [0], "A2": [1], "A3": [2], "A5": [4], "all axes": [0, 1, 2, 3, 4, 5]}

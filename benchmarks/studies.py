@@ -50,9 +50,8 @@ from ir_studies.work.results import NAME
 CELLS = ("open",)
 PLANNERS = (PORTFOLIO, "genetic", "tree", "sbl", "kpiece", "bkpiece", "lbkpiece", "prm", "rrt", "rrt_connect",  # noqa: E501
             "aorrtc")  # fmt: skip
-CEILING_S = (
-    60.0  # s of a request: the work ends it, not the clock, also on a machine that others use
-)
+# s of a request: the work ends it, not the clock, also on a machine that others use
+CEILING_S = 60.0
 WAIT_S = 600.0
 PARTS = ("planners", "killed", *STATISTICS_PARTS, *LAYOUT_PARTS)
 IN_BOTH = (

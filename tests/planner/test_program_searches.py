@@ -44,9 +44,8 @@ PLACE = "{station: place, dwell: 0.5}"
 ROUNDED = 2e-3  # m: positions in a log are whole millimetres, in three axes
 S_M = PlanOptions().safety_distance
 FINE = 0.005  # rad between configurations that Coal is asked about
-A_STEP = (
-    0.02  # m: the tool in a hundredth of a radian of each joint, at its reach, and the rounding
-)
+# m: the tool in a hundredth of a radian of each joint, at its reach, and the rounding
+A_STEP = 0.02
 AT_THE_POSE = 1e-3  # m: Psi below xi (1e-8 m^2), and the rounding
 
 

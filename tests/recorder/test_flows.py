@@ -17,9 +17,8 @@ from ir_recorder.analysis.production import levers
 from ir_recorder.report.sankey import TALL, rows, sankey, sankey_section
 
 OF_READINGS = 1.0  # J: the program's ends lie between two readings of the meter
-OF_SAMPLING = (
-    0.02  # of the axes' energy: joint states and readings of the meter are not at the same instants
-)
+# of the axes' energy: joint states and readings of the meter are not at the same instants
+OF_SAMPLING = 0.02
 JOULES = st.floats(1.0, 1e6)
 
 

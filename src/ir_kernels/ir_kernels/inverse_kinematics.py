@@ -22,9 +22,8 @@ from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 STRETCHED = 1e-9  # m: how far out of reach still counts as stretched
 FREE = np.linspace(-np.pi, np.pi, 25)  # rad: of a free q6, the nearest to 0 first
-SINGULAR = (
-    1e-7  # sine between axis 6 and z2 below which only the sum of the wrist's angles is determined
-)
+# sine between axis 6 and z2 below which only the sum of the wrist's angles is determined
+SINGULAR = 1e-7
 
 
 class ThreeParallelIk:
@@ -197,9 +196,8 @@ def _normal(z: FloatArray) -> FloatArray:
 GRID = 720
 FINER = (4, 16)  # times the grid, in turn, where a solution is missing
 CHUNK = 64  # poses at once: 64 x 720 x 4 candidates fit into the cache
-SLACK = (
-    0.05  # how far beyond a tangent a guess may lie: solutions between two values of q4 are near it
-)
+# how far beyond a tangent a guess may lie: solutions between two values of q4 are near it
+SLACK = 0.05
 _LEVELS = 3  # the grid, and finer ones
 _PARTS = 12  # of a step of the grid, where a branch ends or a solution is near
 _STEPS = 8

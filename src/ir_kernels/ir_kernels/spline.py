@@ -31,9 +31,8 @@ from ir_kernels.spline_terms import SplineTerms, checked_terms
 from ir_values.arrays import FloatArray
 
 RowArray = NDArray[np.int32]
-SAME_CHAIN = (
-    1e-5  # m, or of a unit vector: what the chains of two models of one robot may differ by
-)
+# m, or of a unit vector: what the chains of two models of one robot may differ by
+SAME_CHAIN = 1e-5
 MOST_EVALUATIONS = 2**31 - 1
 
 

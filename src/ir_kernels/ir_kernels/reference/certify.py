@@ -1,13 +1,15 @@
 """Proof that a motion keeps all distances above their thresholds, by bisection of time.
 
-Over an interval about its middle every joint j stays within spread_j of its value there. Then no
-point of a capsule on link i moves farther, seen from link k, than the sum found by turning the
-joints one after the
-other from the outermost: m <- m + spread_j (reach_j + m), j = i..k+1, with reach_j the distance of
-the capsule's axis from joint axis j in the middle (a point that has already moved by m is at most
-reach_j + m away from axis j, which hasn't moved yet). A distance in the middle that exceeds
-threshold + m therefore proves the interval. What can't be proved is halved, down to a movement of
-RESOLUTION: what is left is undecided.
+Over an interval of time every joint j stays within spread_j of its value in the middle. How far m
+can a point of a capsule on link i move meanwhile, seen from link k? Turn the joints one after the
+other, the outermost first, j = i..k+1:
+
+    m <- m + spread_j (reach_j + m)
+
+reach_j is the distance of the capsule's axis from joint axis j in the middle: a point that has
+moved by m already is at most reach_j + m away from axis j, which has not moved yet. A distance in
+the middle that exceeds threshold + m therefore proves the interval. An interval that is not proved
+is halved, down to a movement of RESOLUTION; the rest is undecided.
 """
 
 from typing import NamedTuple, Protocol

@@ -348,9 +348,8 @@ class Execution:
     energy: float
 
 
-_KEPT_WITHIN = (
-    0.1  # s between two messages that a publisher has kept; they are sent without a pause
-)
+# s between two messages that a publisher has kept; they are sent without a pause
+_KEPT_WITHIN = 0.1
 _CANCEL_GRACE = 5.0  # s that a canceled goal may take to stop along the path
 
 

@@ -150,9 +150,8 @@ def can_poll() -> bool:
     return None not in (subscriptions, part(part(_rclpy, "Service"), "service_take_request"))
 
 
-_FILTER_BYTES = (
-    256  # more than rcl_subscription_content_filter_options_t has; all 0 is its beginning
-)
+# more than rcl_subscription_content_filter_options_t has; all 0 is its beginning
+_FILTER_BYTES = 256
 
 
 def keep_only(subscription: Any, expression: str) -> bool:

@@ -31,9 +31,8 @@ from ir_values.errors import InvalidValueError
 # program drives, or the program is refused.
 
 Lines = Sequence[tuple[int, int]]
-_AS_SLOW_AS_NEEDED = (
-    1.0  # speed tolerance: where an axis can't follow the controller slows the tool as well
-)
+# speed tolerance: where an axis can't follow the controller slows the tool as well
+_AS_SLOW_AS_NEEDED = 1.0
 _SAME_PLACE = 2e-3  # m, and of the rotation's entries: as for stations
 _NAMED = 6  # places in a note
 _SAME_CORNER = 0.1  # mm

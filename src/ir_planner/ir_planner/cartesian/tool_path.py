@@ -296,9 +296,8 @@ class HeadingError(Exception):
 # How parts of a path are joined at the corner between them, and by how much that leaves the
 # parts.
 
-SMOOTHING = (
-    2e-5  # m by which a smoothed joint may leave the parts, well below the 0.1 mm of the whole
-)
+# m by which a smoothed joint may leave the parts, well below the 0.1 mm of the whole
+SMOOTHING = 2e-5
 SMOOTHING_TURN = 5e-4  # rad
 SHORTEST_JOINT = 1e-3  # m: a smaller radius is a corner
 _LONGEST_JOINT = 0.05  # m

@@ -17,9 +17,8 @@ from ir_kernels import Extrema, polynomial_extrema, polynomial_samples, portable
 from ir_msgs_py.trajectory import JointTrajectory, Samples
 from ir_values.arrays import BoolArray, FloatArray
 
-_NOTHING = (
-    1e-9  # rad: what higher powers may add to a cubic, as a point per knot of a spline rounds them
-)
+# rad: what higher powers may add to a cubic, as a point per knot of a spline rounds them
+_NOTHING = 1e-9
 _HALVINGS = 15  # a root to 3e-5 of the segment: the value at an extreme is off by its square
 
 

@@ -15,9 +15,8 @@ from ir_kernels import end_points
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_values.arrays import FloatArray
 
-_GENTLY = (
-    6.0  # times v / a, in which the motion of an end dies out: none of it is faster than a then
-)
+# times v / a, in which the motion of an end dies out: none of it is faster than a then
+_GENTLY = 6.0
 
 
 def at_shares(path: FloatArray, shares: FloatArray) -> FloatArray:

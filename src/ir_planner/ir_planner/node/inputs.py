@@ -38,9 +38,8 @@ from ir_values.errors import InvalidValueError, JointNamesError, PoseError
 # What requests say, as values: states, goals, poses, options, trajectories. Nothing here is
 # planned.
 
-AT_REST = (
-    0.01  # rad/s: a measured state that is slower stands; ends of planned movements are at rest
-)
+# rad/s: a measured state that is slower stands; ends of planned movements are at rest
+AT_REST = 0.01
 # s; 4 s for a driver that publishes 500 times a second
 LOOK = 0.02
 LOOKS = 200

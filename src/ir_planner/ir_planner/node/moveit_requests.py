@@ -35,9 +35,8 @@ WAYPOINTS_MAX = 1000
 START_TOLERANCE = 0.01
 """rad, per joint: `trajectory_execution.allowed_start_tolerance` of MoveIt, as it comes."""
 _WHOLE_TURN = 3.14  # rad: a tolerance of pi, as people round it
-_ROTATION_VECTOR = (
-    1  # parameterization of moveit_msgs/OrientationConstraint; 0: angles about x, y, z
-)
+# parameterization of moveit_msgs/OrientationConstraint; 0: angles about x, y, z
+_ROTATION_VECTOR = 1
 _GOALS_MAX = 16  # alternatives of a request
 _CODE = StatusCode.INVALID_GOAL_CONSTRAINTS
 _TURN = StatusCode.FRAME_TRANSFORM_FAILURE

@@ -72,9 +72,8 @@ from ir_values.errors import InvalidValueError, IrError
 
 _PUBLISHERS = 16  # of joint_states beside the robot's, without pushing its message out
 _GOALS_WAITING = 100  # beyond, a client is in a loop: each takes seconds
-_THREADS = (
-    8  # quick and long requests, texts and points, changes, standby, the goal, cancelling, a spare
-)
+# quick and long requests, texts and points, changes, standby, the goal, cancelling, a spare
+_THREADS = 8
 
 
 class PlannerNode(Node):

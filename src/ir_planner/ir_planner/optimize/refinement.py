@@ -182,18 +182,15 @@ _MOVING = 0.985  # share of the limits' speed, for ends in motion: penalties giv
 # shares of the speed tried where a duration is requested, until it is met
 SPEED_MARGINS = (0.9995, 0.95, 0.9)
 _ROUNDING = 1e-9  # relative
-_STIFFER = (
-    10.0  # penalties where a duration is requested: a second may be worth much more than usual
-)
+# penalties where a duration is requested: a second may be worth much more than usual
+_STIFFER = 10.0
 _LEAST_COST = 1.0  # J: of a movement that takes next to nothing
 _ZONE_SAMPLES = 4  # per interval
 _WITHIN_REACH = 1.06  # of a requested duration: from there more effort may get to it
-SHARE_OF_WORK = (
-    0.4  # of what is left, that one descent may take: finer ones and repairs come after it
-)
-EDGES_PER_INTERVAL = (
-    0.25  # work of one evaluation, in certified edges: about what it takes beside one
-)
+# of what is left, that one descent may take: finer ones and repairs come after it
+SHARE_OF_WORK = 0.4
+# work of one evaluation, in certified edges: about what it takes beside one
+EDGES_PER_INTERVAL = 0.25
 
 
 @dataclass(frozen=True, eq=False)

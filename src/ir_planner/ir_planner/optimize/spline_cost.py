@@ -82,9 +82,8 @@ def _tilt_terms(context: Context, upright: float) -> dict[str, Any]:
 _TORQUE_SAMPLES = 6  # per interval; the proof comes after
 _ROUNDS = 25
 _ROUNDED = 5e-7  # relative: of a limit that an end in motion reaches exactly
-_PLAIN = (
-    3  # rounds as if all of the torque fell with the speed: enough unless weight takes much of it
-)
+# rounds as if all of the torque fell with the speed: enough unless weight takes much of it
+_PLAIN = 3
 _CREEPING = 1e-6  # of the speed: weight and dry friction are left of the torque
 _BELOW = 1.0005  # a little slower than asked for, so that few rounds end it
 

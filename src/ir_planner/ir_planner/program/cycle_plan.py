@@ -26,9 +26,8 @@ from ir_planner.timing import Movement
 # What is left of the time is given to the next part in turn where that is cheaper than waiting.
 
 _NEAREST = 8  # programs that are cheapest without carried charge: with it one of them is
-SHORTEST_WAIT = (
-    0.05  # s: less is given to a movement, so that a program doesn't end with a twitch of a pause
-)
+# s: less is given to a movement, so that a program doesn't end with a twitch of a pause
+SHORTEST_WAIT = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,9 +162,8 @@ def _above(cost: float, bound: float) -> float:
 # mains.
 
 _ROUNDING = 1e-6  # s: durations are whole nanoseconds, stretched by millionths
-_SAME_CHAIN = (
-    1  # rungs from the request's own value, over which its chain is taken to stay the best
-)
+# rungs from the request's own value, over which its chain is taken to stay the best
+_SAME_CHAIN = 1
 
 
 _CUT = "no program of {:g} s found"

@@ -22,9 +22,8 @@ from ir_planner.program.time_values import FASTEST, Ladder, TimeValues
 from ir_planner.request import Context, Work
 from ir_planner.service import exit_searches
 
-_CHOOSING = (
-    2_500  # work of a movement while configurations are chosen; more of it improves the chosen ones
-)
+# work of a movement while configurations are chosen; more of it improves the chosen ones
+_CHOOSING = 2_500
 _FIRST = 8_000  # max_iterations of a stop that buy no more than the first program
 _DEEPER = tuple(16_000 * 4**k for k in range(9))  # that buy a chain chosen with more effort
 _MORE = tuple(8_000 * 4**k for k in range(9))  # work of a movement of the chosen chain

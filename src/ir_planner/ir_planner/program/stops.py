@@ -176,9 +176,8 @@ def _exit_paths(
 # Nodes at a stop of a program: configurations that can be entered and left with what is held
 # then.
 
-_MOST_STOPS = (
-    64  # configurations per station that take part: 8 branches with all turns of A1, A4 and A6
-)
+# configurations per station that take part: 8 branches with all turns of A1, A4 and A6
+_MOST_STOPS = 64
 
 
 def posture_nodes(name: str, arriving: Context) -> tuple[list[Node], Status]:
@@ -290,9 +289,8 @@ def _configurations(
 
 # Nodes at a stop that is a path of the tool: movements along it in different configurations.
 
-_MOST_PATH_STOPS = (
-    64  # movements along a path that take part, as many as configurations of a station
-)
+# movements along a path that take part, as many as configurations of a station
+_MOST_PATH_STOPS = 64
 
 
 def path_nodes(arriving: Context, leaving: PlanningScene) -> tuple[list[Node], Status]:

@@ -40,12 +40,10 @@ _FEWEST_GUESSES = 8
 # descend further that cost less than so many times the straight one at first sight.
 _FEW_GUESSES = 8
 _WORTH_FOLLOWING = 1.3
-_RIVALS = (
-    2  # refined like the best where a duration is requested: their order in joules is less certain
-)
-_REFINED = (
-    2  # coarse solutions that are optimised per turn: the second is best in one of four tasks
-)
+# refined like the best where a duration is requested: their order in joules is less certain
+_RIVALS = 2
+# coarse solutions that are optimised per turn: the second is best in one of four tasks
+_REFINED = 2
 
 
 def first_paths(

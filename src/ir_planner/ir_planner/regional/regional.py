@@ -120,9 +120,8 @@ def refusal(
     )
 
 
-_TIMED = (
-    3  # paths that get straight steps with blended corners: the cheapest by W is rarely not best
-)
+# paths that get straight steps with blended corners: the cheapest by W is rarely not best
+_TIMED = 3
 
 
 def plan_regional(

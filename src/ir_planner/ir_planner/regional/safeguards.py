@@ -30,9 +30,8 @@ from ir_planner.timing import (
 from ir_values.arrays import FloatArray
 
 Answer = tuple[str, Movement]  # the search that found it
-_OPTIMISED_AGAIN = (
-    2  # coarse solutions refined for another objective, and the best of them thoroughly
-)
+# coarse solutions refined for another objective, and the best of them thoroughly
+_OPTIMISED_AGAIN = 2
 # factors tried on that of least joules, in so many steps
 _OTHER_DURATIONS = (0.75, 1.33)
 _DURATION_STEPS = 4

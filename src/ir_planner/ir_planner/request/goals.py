@@ -47,12 +47,13 @@ def one_goal(
     cell: Cell,
     forms: tuple[str, ...] = ("goal", "goal_state", "goal_pose"),
 ) -> Goal:
-    """The goal that a request gives in exactly one of its `forms`: configuration (n,), pose (4,
-    4).
-    """
-    given = [name for name, there in (("goal", bool(text)), ("goal_state", configuration is not
-    None),
-                                      ("goal_pose", pose is not None)) if there]  # fmt: skip
+    """The goal that a request gives in exactly one form: text, configuration (n,), pose (4, 4)."""
+    filled = {
+        "goal": bool(text),
+        "goal_state": configuration is not None,
+        "goal_pose": pose is not None,
+    }
+    given = [name for name, there in filled.items() if there]
     if len(given) != 1:
         which = " and ".join(given) or "none (a goal_pose without a frame_id is not given)"
         raise RequestError(

@@ -121,9 +121,8 @@ class LazyTrees:
             stack += self._children[node]
 
 
-_STATES_PER_EDGE = (
-    40  # configurations that cost as much as one certified edge, as in the genetic search
-)
+# configurations that cost as much as one certified edge, as in the genetic search
+_STATES_PER_EDGE = 40
 _SIZES = np.arange(1, 65).reshape(
     16, 4
 )  # by which the cube is divided, sample by sample, in batches

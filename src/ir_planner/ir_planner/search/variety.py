@@ -21,9 +21,8 @@ from ir_planner.scene import path_cost
 from ir_values.arrays import FloatArray
 
 T = TypeVar("T")
-NEAREST_GOALS = (
-    3  # goals that are tried by a search which takes one at a time: the rest cost more by W
-)
+# goals that are tried by a search which takes one at a time: the rest cost more by W
+NEAREST_GOALS = 3
 PATHS = 3  # that one search answers with: more of them rarely differ in homotopy class
 # rad
 MIDDLE = 0.15

@@ -92,9 +92,8 @@ def _work_area(scene: PlanningScene, station: str) -> WorkArea:
     return WorkArea.built(scene, scene.station(station))
 
 
-_EDGE_SAMPLES = (
-    12  # per step of a path where contacts are asked for; the proof of the movement is exact
-)
+# per step of a path where contacts are asked for; the proof of the movement is exact
+_EDGE_SAMPLES = 12
 
 
 @dataclass(frozen=True, eq=False)

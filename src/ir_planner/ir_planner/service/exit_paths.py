@@ -113,14 +113,12 @@ EXIT_SEARCHES: Registry[ExitSearch] = Registry(
     made_exit_search,
     stand_in=UnusableWithdrawal,
 )
-_SEARCHED = (
-    2  # raw paths per candidate that is wanted: shortened, some of them end at the same place
-)
+# raw paths per candidate that is wanted: shortened, some of them end at the same place
+_SEARCHED = 2
 _STREAM = 7  # of the request's seed, so that other stages draw other numbers
 _END_SAMPLES = 24  # of the last step, where the zone is left: about a centimetre apart
-_CORNERS = (
-    11  # points of a path between which shortcuts are tried: their number grows with the square
-)
+# points of a path between which shortcuts are tried: their number grows with the square
+_CORNERS = 11
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,9 +29,8 @@ from ir_planner.timing import (
 )
 from ir_values.arrays import FloatArray
 
-SPACING = (
-    0.03  # m between points of the line: in between, the tool leaves it by less than a millimetre
-)
+# m between points of the line: in between, the tool leaves it by less than a millimetre
+SPACING = 0.03
 _JUMP = 0.35  # rad: a larger step between neighbours is another branch or a singular wrist
 
 

@@ -74,12 +74,10 @@ def step_weights(link_mass: FloatArray, load_mass: float, weighting: str) -> Flo
     return np.asarray(weight / weight.mean())
 
 
-_DAMPING = (
-    0.02  # m^2, of the least squares: near a singular wrist rates stay below 1 / (2 * damping)
-)
-_ROTATION_LENGTH = (
-    0.5  # m/rad, lambda of eq. (2): how much a turn of the tool weighs against its travel
-)
+# m^2, of the least squares: near a singular wrist rates stay below 1 / (2 * damping)
+_DAMPING = 0.02
+# m/rad, lambda of eq. (2): how much a turn of the tool weighs against its travel
+_ROTATION_LENGTH = 0.5
 _WEIGHTED = np.array([1.0, 1.0, 1.0, *[_ROTATION_LENGTH] * 3])[:, None]
 _DAMPED = (_DAMPING * _DAMPING) * np.eye(6)
 # the spread shrinks at most to this share in one generation, so that one step can't end it

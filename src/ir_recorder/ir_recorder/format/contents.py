@@ -21,9 +21,8 @@ PARAMETERS: Final = "{node}.parameters.yaml"
 FACTS: Final = "ir_recorder"  # metadata record
 VERSION: Final = "version"
 STARTED: Final = "started_ns"  # node clock at the start [ns]
-PACKAGES: Final = (
-    "packages"  # fact: versions of the project's packages and of those that decide numbers
-)
+# fact: versions of the project's packages and of those that decide numbers
+PACKAGES: Final = "packages"
 ARITHMETIC: Final = "arithmetic"  # fact: digest of numbers whose bits may differ elsewhere
 RECORDING: Final = "recording"  # of a recording in several files: the same in all of them
 PART: Final = "part"  # which of them, from 0
@@ -42,9 +41,8 @@ OWN_FACTS: Final = (
 # facts with a meaning for the analysis; all others are only shown
 SAFETY_DISTANCE: Final = "safety_distance"  # S_m [m] that movements are planned with: "0.02 m"
 PLAN: Final = "plan"  # "never driven": a plan, found or not, without a robot
-UNSHORTENED_PAUSES: Final = (
-    "unshortened_pauses"  # full lengths of the pauses in power modes: "180 s, 1800 s"
-)
+# full lengths of the pauses in power modes: "180 s, 1800 s"
+UNSHORTENED_PAUSES: Final = "unshortened_pauses"
 
 
 def attached(namespace: str, name: str) -> str:

@@ -103,9 +103,8 @@ class CellSide:
 
 # `plc.Controller` on a running simulation.
 
-_POWER_WINDOW = (
-    0.01  # s; the mean power that a PLC reads is over at least one period of power_state
-)
+# s; the mean power that a PLC reads is over at least one period of power_state
+_POWER_WINDOW = 0.01
 _ALIVE_STEPS = 100  # a PLC that polls at 10 Hz or slower sees every change of the alive counter
 
 

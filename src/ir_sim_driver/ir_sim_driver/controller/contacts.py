@@ -40,9 +40,8 @@ from ir_values.arrays import BoolArray, FloatArray
 
 LONGEST = 100  # steps between two looks, however far everything is
 _FAR = 10.0  # m: as far as nothing gets within LONGEST
-STIFFNESS = (
-    1e6  # N/m of the arm at its tool: 1 N per micrometre, what robots of this size are measured at
-)
+# N/m of the arm at its tool: 1 N per micrometre, what robots of this size are measured at
+STIFFNESS = 1e6
 _RELEASE = 5e-4  # m that a pair in contact may go deeper: opening brakes let the arm settle
 HARDEST = 6.0
 """Times the acceleration limits: the torque envelope and gravity give a surface 4.1 times (the
@@ -346,8 +345,7 @@ class CellWatch:
         """Grows with every change of a machine's state and every contact."""
         return self._versions
 
-    # -- what changes
-    # ---------------------------------------------------------------------------------------
+    # -- what changes -----------------------------------------------------------------------------
 
     def stand_in(self, cell: Cell, load: Carried) -> None:
         """The robot stands in another cell from now on, with this load."""
@@ -385,8 +383,7 @@ class CellWatch:
         self._touch = None
         self._arrange()
 
-    # -- what is asked
-    # --------------------------------------------------------------------------------------
+    # -- what is asked ----------------------------------------------------------------------------
 
     def states(self) -> tuple[MachineState, ...]:
         """What every machine is in, and changes to."""
@@ -412,8 +409,7 @@ class CellWatch:
         """What a trajectory of this station must keep clear of now."""
         return self._contacts.asked(self._scene, station)
 
-    # -- stepped
-    # --------------------------------------------------------------------------------------------
+    # -- stepped ----------------------------------------------------------------------------------
 
     def look(self, step: int, executor: Executor, dynamics: DynamicsModel, safety: Safety) -> None:
         """Look after this step, which is due; a robot that touches what it may not is stopped by

@@ -178,8 +178,7 @@ class Driver:
         for ended, outcome in calls:
             ended(outcome)
 
-    # -- movements
-    # ------------------------------------------------------------------------------------------
+    # -- movements --------------------------------------------------------------------------------
 
     def admit(self, points: int, size: int = 0) -> int:
         """Ticket for a goal of so many points and bytes, before it is converted. Raises
@@ -302,8 +301,7 @@ class Driver:
         """Whether a stop is latched."""
         return self._simulation.stopped
 
-    # -- requests; each raises RequestRefusedError, also while the controller is off the network
-    # -------------
+    # -- requests; each raises RequestRefusedError, also while the controller is off the network --
 
     def press(
         self, writer: str, name: str, level: bool, came_ns: int = 0, client: str = ""
@@ -385,8 +383,7 @@ class Driver:
                     Level.WARN, f"cell {planned.cell.name!r} of the planner is not taken: {reason}"
                 )
 
-    # -- what people see
-    # ------------------------------------------------------------------------------------
+    # -- what people see --------------------------------------------------------------------------
 
     def warn(self, sentence: str) -> None:
         """Add a warning to the notices."""

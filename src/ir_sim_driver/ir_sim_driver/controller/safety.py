@@ -21,9 +21,8 @@ from ir_values.arrays import FloatArray
 # Excursion: how far the tool leaves its path while the brakes stop the robot.
 
 _AHEAD = 2.0  # s of path that a stop can cover at most
-_SAMPLES = (
-    400  # one every 5 ms: a chord of them leaves the path by less than 0.1 mm at working speed
-)
+# one every 5 ms: a chord of them leaves the path by less than 0.1 mm at working speed
+_SAMPLES = 400
 
 
 class Excursion:

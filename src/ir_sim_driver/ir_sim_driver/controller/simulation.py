@@ -244,8 +244,7 @@ class Simulation:
         """Why the robot is stopped, "" when it is not or by the emergency stop."""
         return self.safety.fault
 
-    # -- what may be asked
-    # ----------------------------------------------------------------------------------
+    # -- what may be asked ------------------------------------------------------------------------
 
     def vet(self, goal: TrajectoryGoal, now_ns: int) -> VettedGoal:
         """Check all of a goal that does not depend on the robot's state; may run beside `step`.

@@ -15,9 +15,8 @@ from ir_sim_driver.motion import ErrorCode, Outcome, TrajectoryGoal
 from ir_sim_driver.node.messages import goal_from_trajectory
 from ir_sim_driver.node.trajectory_actions import Admit, TrajectoryReader
 
-_POINT = (
-    256  # bytes; one with positions, velocities, accelerations and efforts of six joints has 232
-)
+# bytes; one with positions, velocities, accelerations and efforts of six joints has 232
+_POINT = 256
 _OBJECTS = 4  # times its bytes that a message takes as Python objects
 _HEAD = 65_536  # bytes for header and names: some twenty times what they need
 

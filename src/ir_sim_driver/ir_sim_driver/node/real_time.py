@@ -20,9 +20,8 @@ _BACK = _NS // 2  # a clock that is this far behind the next stamp has jumped
 _AT_ONCE = (
     _NS // 10
 )  # a delay of up to this is made up for at once: no gap in what others see is shorter
-_WALL_SHARE = (
-    0.5  # of an advance of the clock in which the process can't have looked: it was suspended
-)
+# of an advance of the clock in which the process can't have looked: it was suspended
+_WALL_SHARE = 0.5
 
 
 @dataclass(frozen=True)

@@ -76,12 +76,10 @@ def _used(process: int) -> float:
 
 
 SEEDS = 100_000  # between the first requests of two seeds
-_SHARE_OF_ENDS = (
-    0.8  # of the clearance at start and goal, where that is smaller than the safety distance
-)
-_LAST_STEP = (
-    0.05  # s that a request is left to end its last step: a descent and its proof take up to these
-)
+# of the clearance at start and goal, where that is smaller than the safety distance
+_SHARE_OF_ENDS = 0.8
+# s that a request is left to end its last step: a descent and its proof take up to these
+_LAST_STEP = 0.05
 _FIRST = "first feasible"  # how the note of the stage begins that knew the first free path
 
 

@@ -23,9 +23,8 @@ from ir_values.arrays import FloatArray
 # taken by points on their surface, and all bodies a millimetre smaller than they are. The robot's
 # base counts against what it stands on; the planner keeps it clear of everything else.
 
-TOUCHING = (
-    1e-3  # m that a body is smaller on each side: machines stand side by side, and data are rounded
-)
+# m that a body is smaller on each side: machines stand side by side, and data are rounded
+TOUCHING = 1e-3
 # m that an overlap as drawn may grow: points of a curved body that turns lie so far inside it
 DEEPER = 5e-3
 _APART = 1e-9  # m between a plane and the bodies that it separates

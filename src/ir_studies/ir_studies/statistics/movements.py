@@ -30,9 +30,8 @@ from ir_values.arrays import FloatArray
 NEAREST = 0.002  # m that a place keeps
 CANDIDATES = 8  # withdrawals of a station, in different configurations
 LONGEST = 600.0  # s: work ends a request, not the clock
-SHARE_OF_ENDS = (
-    0.8  # of the clearance at the ends of a movement, where that is less than the safety distance
-)
+# of the clearance at the ends of a movement, where that is less than the safety distance
+SHARE_OF_ENDS = 0.8
 
 
 @dataclass(frozen=True, eq=False)

@@ -270,18 +270,18 @@ def _in_words(found: Findings) -> Iterator[str]:
 
 def summed_up(found: Findings) -> str:
     """A row of CSV per comparison; the differences are in percent of the second."""
-    lines = [
-        ",".join(
-            str(value)
-            for value in (
-                f'"{each.name}"', each.pairs, each.count, each.mean.value, each.mean.low, each.mean.high,  # noqa: E501
-                each.median.value, each.median.low, each.median.high, each.effect, each.less, each.more,  # noqa: E501
-                each.chance, int(each.shown),
-            )
+    rows = [
+        (
+            f'"{each.name}"',
+            each.pairs,
+            each.count,
+            *(each.mean.value, each.mean.low, each.mean.high),
+            *(each.median.value, each.median.low, each.median.high),
+            *(each.effect, each.less, each.more, each.chance, int(each.shown)),
         )
         for each in (*found.comparisons, *found.agreements)
-    ]  # fmt: skip
-    return "\n".join([",".join(_SUMMED_UP), *lines]) + "\n"
+    ]
+    return "".join(f"{','.join(map(str, row))}\n" for row in (_SUMMED_UP, *rows))
 
 
 def _table(comparisons: Sequence[Comparison], caption: str, sides: tuple[str, str]) -> str:

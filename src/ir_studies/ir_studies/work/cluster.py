@@ -128,12 +128,10 @@ _LOOK_S = 0.2  # between two looks whether somebody asks to stop
 _COUNT_S = 1.0
 # for the end of what a study leaves behind: who does not answer ends it without being asked
 _LEAVE_S = 10.0
-_AHEAD = (
-    4  # jobs that each thread has waiting: none waits for the next one to come over the network
-)
-_MOST_TIMES = (
-    3  # that Dask may give a job up because four workers died that had it, or had it waiting
-)
+# jobs that each thread has waiting: none waits for the next one to come over the network
+_AHEAD = 4
+# that Dask may give a job up because four workers died that had it, or had it waiting
+_MOST_TIMES = 3
 _GONE = "the scheduler is gone: the same command goes on when it is back"
 _MISSING = (
     'a Dask cluster needs Dask: pip install "ir_studies[cluster]", or pip install dask distributed'

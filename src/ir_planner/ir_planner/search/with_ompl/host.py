@@ -77,9 +77,8 @@ _LOOK_S = 0.005  # s between two looks whether the request was cancelled or its 
 _ATTEMPTS = 2  # a host that died since the last request is started again once
 _LAST_S = 0.02  # s on the request's clock, for an answer that is asked for at its end
 _LAST_LOOKS = 400  # at most, where that clock stands
-_PATIENCE = (
-    24_000  # looks, two minutes, until a host that answers nobody is ended: OMPL loads in seconds
-)
+# looks, two minutes, until a host that answers nobody is ended: OMPL loads in seconds
+_PATIENCE = 24_000
 Charged = Callable[[int], AbstractContextManager[object]]
 _charged: Charged = lambda process: nullcontext()  # noqa: E731 - until somebody asks
 

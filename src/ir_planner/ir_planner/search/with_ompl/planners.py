@@ -16,9 +16,8 @@ from ir_planner.search.with_ompl.host import OmplParameters, OmplProblem, asked,
 from ir_values.arrays import FloatArray
 from ir_values.settings import check_settings, setting
 
-_SHARE = (
-    0.75  # of the work that is left goes into OMPL's checks: its path is certified, and improved
-)
+# of the work that is left goes into OMPL's checks: its path is certified, and improved
+_SHARE = 0.75
 _REPAIR = 4000  # edges of a tree around a blocked step
 
 

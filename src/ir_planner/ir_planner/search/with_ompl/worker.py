@@ -31,9 +31,8 @@ try:
 except ImportError as error:  # reported to whoever asks
     _REASON = str(error)
 
-STATES_PER_EDGE = (
-    40  # configurations that cost as much as one certified edge, as in the genetic search
-)
+# configurations that cost as much as one certified edge, as in the genetic search
+STATES_PER_EDGE = 40
 _LOOK = 64  # checks between two looks whether somebody still waits for the answer
 _PR_SET_PDEATHSIG = 1  # of prctl: the signal that a process gets when its parent ends
 # s beyond the ceiling: who asks ends the process at the ceiling, this is for when nobody does
