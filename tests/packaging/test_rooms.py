@@ -18,7 +18,7 @@ ROOMS = {
     "ir_planner": (
         "errors", "presentation", "cycle", "curves", "scene", "request", "checks", "configurations", "timing", "search", "optimize",  # noqa: E501
         "cartesian", "regional", "trajectories", "service", "settings", "program", "store",
-        "current_cell", "certificates", "state_queries", "waiting_postures", "flexible", "planner",
+        "current_cell", "validity", "state_queries", "waiting_postures", "flexible", "planner",
         "krl", "robots", "before_after", "what_if", "node", "contract",
     ),
     "ir_description": (

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.checks.clearance import clearance_profile
+from ir_planner.checks.distances import clearance_profile
 from ir_planner.checks.evaluation import evaluate_trajectory
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_values.arrays import FloatArray

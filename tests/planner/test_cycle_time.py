@@ -21,12 +21,19 @@ from ir_planner import Planner
 from ir_planner.checks import Consumption
 from ir_planner.errors import RequestError
 from ir_planner.program.bounds import Rates
-from ir_planner.program.cycle_plan import Task, shared_out
+from ir_planner.program.cycle_time import Task, shared_out
+from ir_planner.program.movement_fronts import (
+    FASTEST,
+    LADDER,
+    Ladder,
+    Point,
+    TimeValues,
+    convex_front,
+)
 from ir_planner.program.program import plan_program
 from ir_planner.program.request import ProgramPlan, ProgramRequest
 from ir_planner.program.standby import plan_standby
 from ir_planner.program.station_graph import HopPart
-from ir_planner.program.time_values import FASTEST, LADDER, Ladder, Point, TimeValues, convex_front
 from ir_planner.request.context import Work
 from ir_planner.scene.planning_scene import load_text, scene_with
 from ir_planner.timing import Movement

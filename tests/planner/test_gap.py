@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_planner.program.choice import Choice
-from ir_planner.program.cycle_plan import cycle_bound, cycle_gap
+from ir_planner.program.cycle_time import cycle_bound, cycle_gap
 
 BASE = 600.0  # W, while a program moves
 CAPACITY = 100.0  # J

@@ -25,14 +25,6 @@ from ir_msgs_py.options import NO_TILT, PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.cartesian import CartesianPlan, checked_path_options, plan_path
-from ir_planner.certificates import (
-    AnyMovement,
-    evaluation_in,
-    movement_in,
-    optimization_in,
-    program_in,
-    service_in,
-)
 from ir_planner.checks import Evaluation, StateCheck, evaluate_trajectory
 from ir_planner.configurations import (
     IK_METHODS,
@@ -98,6 +90,14 @@ from ir_planner.trajectories import (
     ViaSearch,
     optimize_trajectory,
     plan_through,
+)
+from ir_planner.validity import (
+    AnyMovement,
+    evaluation_in,
+    movement_in,
+    optimization_in,
+    program_in,
+    service_in,
 )
 from ir_planner.waiting_postures import standby_at
 from ir_values.argument_types import typed_methods

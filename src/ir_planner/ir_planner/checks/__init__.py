@@ -1,6 +1,6 @@
 """Checks of a configuration or a trajectory: free, limits, torque, clearance, energy, proof."""
 
-from ir_planner.checks.clearance import nearest_pair, nearest_pairs, pair_value
+from ir_planner.checks.distances import nearest_pair, nearest_pairs, pair_value
 from ir_planner.checks.energy import (
     MovementEnergy,
     carried,

@@ -12,7 +12,7 @@ from ir_msgs_py.options import NO_TILT
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.checks.clearance import ClearanceProfile, clearance_profile
+from ir_planner.checks.distances import ClearanceProfile, clearance_profile
 from ir_planner.checks.energy import MovementEnergy, movement_energy, peak_power
 from ir_planner.checks.verification import TILT, AtRest, Verification, verify
 from ir_planner.presentation import plot_profiles, report_text, status_text

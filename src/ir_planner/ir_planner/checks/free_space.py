@@ -9,7 +9,7 @@ import numpy as np
 from ir_kernels.collision import FREE, Certificates
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.status import Status, StatusCode
-from ir_planner.checks.clearance import nearest_pairs, pair_value
+from ir_planner.checks.distances import nearest_pairs, pair_value
 from ir_planner.checks.verification import leans
 from ir_planner.curves import in_short_steps
 from ir_planner.presentation import in_mm, status_text

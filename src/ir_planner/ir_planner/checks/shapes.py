@@ -8,7 +8,7 @@ import numpy as np
 
 from ir_description import Body, Cell
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.checks.clearance import ClearanceProfile
+from ir_planner.checks.distances import ClearanceProfile
 from ir_planner.scene import PlanningScene
 from ir_values.arrays import FloatArray
 

@@ -15,7 +15,7 @@ from ir_kernels.collision import COLLIDES, FREE
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.checks.clearance import pair_value
+from ir_planner.checks.distances import pair_value
 from ir_planner.checks.tool_motion import ToolUse
 from ir_planner.curves import Extremes, extremes
 from ir_planner.presentation import in_mm, told_apart

@@ -27,7 +27,6 @@ from ir_msgs_py.modes import TransitionTimes
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_msgs_py.status import StatusCode
-from ir_planner.certificates import in_scene
 from ir_planner.checks import Evaluation, evaluate_trajectory, total_report
 from ir_planner.curves import turn_of
 from ir_planner.errors import RequestError
@@ -42,6 +41,7 @@ from ir_planner.program import Charge, Pause, Scenes, spent
 from ir_planner.request import POSTURES, safety_distance
 from ir_planner.scene import PlanningScene, load_text
 from ir_planner.timing import standing
+from ir_planner.validity import in_scene
 from ir_values.arrays import FloatArray
 
 # What a driven program costs in the cell: seconds, joules and clearance of every step, and its

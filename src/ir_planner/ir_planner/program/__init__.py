@@ -5,6 +5,7 @@ modes.
 from ir_planner.program.chain import cheapest_chain
 from ir_planner.program.choice import Choice
 from ir_planner.program.more_work import chosen
+from ir_planner.program.movement_fronts import Ladder, Point, TimeValues
 from ir_planner.program.movements import Movements
 from ir_planner.program.pauses import (
     AUTO,
@@ -51,7 +52,6 @@ from ir_planner.program.steps import (
     with_doors,
 )
 from ir_planner.program.stops import Node, station_nodes
-from ir_planner.program.time_values import Ladder, Point, TimeValues
 
 __all__ = [
     "ACROSS",

@@ -9,12 +9,12 @@ from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import clearance_violation
 from ir_planner.program.chain import parts_of
+from ir_planner.program.movement_fronts import Ladder
 from ir_planner.program.movements import Failure, Movements
 from ir_planner.program.pauses import AUTO, Charge, Pause, pause_by_itself, planned_pause
 from ir_planner.program.request import ProgramRequest, Progress, StageError
 from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, HopPart, StationChain
 from ir_planner.program.steps import PlacedStep, Route, Scenes, signal_text
-from ir_planner.program.time_values import Ladder
 from ir_planner.scene import PlanningScene
 from ir_planner.timing import Movement
 from ir_values.arrays import FloatArray

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from ir_planner.errors import RequestError
 from ir_planner.program.chain import cheapest_chain, layers_of
 from ir_planner.program.choice import Choice, Found, Steps
-from ir_planner.program.cycle_plan import cycle_gap, free_gap, timed_choice
+from ir_planner.program.cycle_time import cycle_gap, free_gap, timed_choice
+from ir_planner.program.movement_fronts import FASTEST, Ladder, TimeValues
 from ir_planner.program.movements import Movements, WarmStarts, cost_of, rates_of
 from ir_planner.program.request import ProgramRequest, Progress, StageError
 from ir_planner.program.station_graph import ACROSS
 from ir_planner.program.steps import Route
-from ir_planner.program.time_values import FASTEST, Ladder, TimeValues
 from ir_planner.request import Context, Work
 from ir_planner.service import exit_searches
 

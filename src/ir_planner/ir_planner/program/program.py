@@ -17,7 +17,7 @@ from ir_planner.checks import total_report
 from ir_planner.errors import RequestError
 from ir_planner.program.chain import TOLERANCE, CostEdges, layers_of
 from ir_planner.program.choice import Choice, Steps
-from ir_planner.program.cycle_plan import front_of
+from ir_planner.program.cycle_time import front_of
 from ir_planner.program.more_work import best_answer
 from ir_planner.program.movements import Movements
 from ir_planner.program.pauses import AUTO, MOTORS

@@ -12,12 +12,12 @@ from ir_msgs_py.savings import ProgramSavings, Saving
 from ir_planner.checks import interval
 from ir_planner.errors import RequestError, TimingError
 from ir_planner.program.choice import Choice, Steps, duration_of
-from ir_planner.program.cycle_plan import timed_choice
+from ir_planner.program.cycle_time import timed_choice
+from ir_planner.program.movement_fronts import FASTEST
 from ir_planner.program.movements import Failure, Movements, mapped
 from ir_planner.program.request import Progress, StageError
 from ir_planner.program.spreads import Spreads
 from ir_planner.program.station_graph import ACROSS, HopPart, StationChain
-from ir_planner.program.time_values import FASTEST
 from ir_planner.scene import movement_cost
 from ir_planner.timing import Movement, baseline, straight_steps
 from ir_values.arrays import FloatArray

@@ -1,5 +1,6 @@
-"""The paper's regional movement: the straight movement, and the genetic correction of what
-collides.
+"""The paper's regional movement: the straight one, and the genetic correction of what collides.
+
+The modified GA of eq. (7) is another: it withdraws, service/stochastic_withdrawal.py.
 
 The movement of least W (eq. 9) is the straight one of all joints. Where its discretised path meets
 a forbidden zone, the stretch that collides, and no more, gets vias from a population

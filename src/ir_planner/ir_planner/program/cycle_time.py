@@ -10,16 +10,16 @@ from ir_msgs_py.status import Status, StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.program.chain import cheapest_chain
 from ir_planner.program.choice import Choice, Found, Steps
+from ir_planner.program.movement_fronts import FASTEST, Point, SlowDown, TimeValues, slow_downs
 from ir_planner.program.movements import rates_of
 from ir_planner.program.request import Progress, StageError
 from ir_planner.program.station_graph import HopPart, StationChain
-from ir_planner.program.time_values import FASTEST, Point, SlowDown, TimeValues, slow_downs
 from ir_planner.request import DURATION_MAX
 from ir_planner.timing import Movement
 
 # A program within a cycle time: the seconds there are go where they save most joules.
 #
-# The movements of the chain are known at several values of a second (time_values). From the
+# The movements of the chain are known at several values of a second (movement_fronts). From the
 # fastest of all, parts are slowed down in the order of joules saved per second; a step that takes
 # more than the time left is passed over. Every stage of that is a program that ends early and
 # waits, in the mode of least energy for the wait's length; the cheapest of them is the answer.

@@ -1,6 +1,6 @@
-"""Where an answer holds: every report names the cell and the load that it was proved with, and the
-power parameters that its joules follow from, with the interval that their uncertainty leaves. Every
-answer says which doors were not as the cell has them.
+"""Where an answer holds: its cell and load, the parameters and intervals of its joules, doors.
+
+A certified report names the cell and the load that it was proved with. Nothing is proved here.
 """
 
 from collections.abc import Callable
