@@ -15,6 +15,8 @@ from ir_planner.checks import FreeSpace
 from ir_planner.optimize import QUICK, THOROUGH, Portfolio, Refinement
 from ir_planner.request import Context
 from ir_planner.search import (
+    EXPLORERS,
+    FIRST_SEARCHES,
     SEARCHES,
     Ends,
     Search,
@@ -22,16 +24,12 @@ from ir_planner.search import (
     guesses,
     keeps_upright,
     quick,
+    role_of,
 )
 from ir_values.arrays import FloatArray
 
 Searches = Mapping[str, Search]
 Path = tuple[str, FloatArray]  # the search that found it, and its waypoints (M, n)
-# in the order of what they cost where the straight movement collides: measured by
-# benchmarks/regional.py
-FIRST = ("direct", "tree", "detours", "retract")
-# that find other homotopy classes with another seed
-EXPLORERS = ("detours", "tree", "genetic")
 GUESS = "guess"  # the method of movements that a guess became
 # that guesses lead to, and so many to each of them
 _GOALS = 6
@@ -67,9 +65,8 @@ def first_paths(
             journal.keep(correction_log(found.correction, found.paths[0], ends.start, space))
         if found.paths:
             return [(name, path) for path in found.paths]
-        if (
-            journal.work.exhausted
-        ):  # not before the first: what is free at once is found in any time
+        # not before the first: what is free at once is found in any time
+        if journal.work.exhausted:
             break
     return []
 
@@ -79,7 +76,7 @@ def _attempts(planner_id: str, searches: Searches, briefly: bool) -> Iterator[tu
         if not briefly:
             yield planner_id, searches[planner_id]
         return
-    for name in FIRST:
+    for name in FIRST_SEARCHES:
         if briefly:
             yield name, quick(searches[name])
         elif quick(searches[name]) != searches[name]:
@@ -119,8 +116,8 @@ def improve(
         while more():
             before = work.iterations
             for name in explorers:
-                # the genetic search costs more than both others: not before their first turn
-                if more() and not (name == "genetic" and turn == 0 and len(explorers) > 1):
+                later = turn == 0 and len(explorers) > 1 and role_of(name).costly
+                if more() and not later:
                     seed = _seed(context.options.seed, turn, name)
                     found = quick(searches[name]).find(ends, portfolio.space, seed, work)
                     new[name] += portfolio.add(name, found.paths)

@@ -1,12 +1,23 @@
 """Comparisons before an answer is given, so that no other request would have found a better one.
 
-The baseline movement is a candidate of every answer of the default portfolio. A requested duration
-is met by the cheapest movement of free duration too, and where nothing else is left by the fastest
-one, both stretched. The movements of least W have few turns, and those of a high price of time come
-from smoother descents: some of them are faster than what the descent for time ends in.
+The descents of a request may end in a local minimum that another question leaves: movements of
+least W have few turns, those of a high price of time come from smoother descents, and some of both
+are faster than what the descent for time ends in. So companions are run beside a request, and the
+cheapest of all is its answer. The baseline movement is a candidate of every answer of the default
+portfolio.
+
+| objective | companions of a free duration |
+| --- | --- |
+| time | fewest turns near its own paths (W); in a hurry (a high price of time) |
+| movement_cost | the answer for J |
+| energy | none; faster and slower movements near its own answer |
+| time_and_energy | none |
+
+A requested duration is met by the request's own descents; where these leave a doubt, by the answer
+for J near their paths, else by the fastest with all companions of `time`; both stretched.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,27 +63,83 @@ class Exploration:
     searches: Searches
 
 
+# Companions: further runs beside a request. Each gets the portfolio of the request's own run, and
+# gives the best movement by its own question.
+
+Companion = Callable[[Portfolio, Exploration, Context], Answer | None]
+
+
+def _fewest_turns(own: Portfolio, exploration: Exploration, context: Context) -> Answer | None:
+    """The movement of least W near the paths of the request's own run."""
+    return _optimised_again(own, context.asking("movement_cost"))
+
+
+def _in_a_hurry(own: Portfolio, exploration: Exploration, context: Context) -> Answer | None:
+    """The fastest movement near the best one for a high price of time: joules smooth the descent,
+    and lead to other local minima than time alone. None where that is far from the own best one.
+    """
+    context = context.asking("time")
+    best = own.best()
+    found = _explored(exploration, context.valuing_time(_HURRY)).best()
+    hurried = _as_asked(found, context)[0]
+    if hurried is None or (best is not None and hurried[1].cost > _NEAR * best[1].cost):
+        return None
+    method, movement = hurried
+    fastest = near(movement, context)
+    return _cheaper(hurried, None if fastest is None else (method, fastest))
+
+
+def _for_both(own: Portfolio, exploration: Exploration, context: Context) -> Answer | None:
+    """The answer for J."""
+    return _explored(exploration, context.asking("time_and_energy")).best()
+
+
+COMPANIONS: Mapping[str, tuple[Companion, ...]] = {
+    "time": (_fewest_turns, _in_a_hurry),
+    "movement_cost": (_for_both,),
+    "energy": (),
+    "time_and_energy": (),
+}
+
+
+class _Comparison:
+    """The cheapest answer to a request so far, and the shortest own duration [s] of any movement
+    that was compared.
+    """
+
+    def __init__(self, context: Context, own: Portfolio) -> None:
+        self._context = context
+        self.best = own.best()
+        self.shortest = own.refinement.shortest
+
+    def consider(self, found: Answer | None) -> None:
+        """Compare a movement of another question, as an answer to this request."""
+        answer, duration = _as_asked(found, self._context)
+        self.best = _cheaper(self.best, answer)
+        self.shortest = min(self.shortest, duration)
+
+    def consider_companions(self, objective: str, own: Portfolio, exploration: Exploration) -> None:
+        """Compare the companions of a run for an objective."""
+        for companion in COMPANIONS[objective]:
+            self.consider(companion(own, exploration, self._context))
+
+
 def best_found(exploration: Exploration, context: Context) -> tuple[Answer | None, float]:
     """The best answer by the searches and descents of the request and of its companions, and the
     shortest duration [s] met where none is as short as requested.
     """
     own = _explored(exploration, context)
-    if context.options.planner_id:
+    options = context.options
+    if options.planner_id:
         return own.best(), own.refinement.shortest
-    if context.options.duration > 0.0:
+    if options.duration > 0.0:
         return _of_duration(own, exploration, context)
-    return _of_free_duration(own, exploration, context)
-
-
-def _of_free_duration(
-    own: Portfolio, exploration: Exploration, context: Context
-) -> tuple[Answer | None, float]:
-    best = own.best()
-    shortest = own.refinement.shortest
-    if context.options.objective == "time":
-        best, fastest = _with_faster(best, own, exploration, context)
-        shortest = min(shortest, fastest)
-    return _held_against_others(best, exploration, context), shortest
+    compared = _Comparison(context, own)
+    compared.consider_companions(options.objective, own, exploration)
+    best = compared.best
+    if options.objective == "energy" and best is not None:
+        best = best[0], _least_over_durations(best[1], context)
+    return best, compared.shortest
 
 
 def _of_duration(
@@ -83,65 +150,26 @@ def _of_duration(
     """
     work = context.work
     best = own.best()
-    shortest = own.refinement.shortest
     if best is not None:
         method, path = exploration.paths[0]
         if not (work.exhausted or np.array_equal(best[1].path, path)):
             own.refine_anew(method, path)
-        best = own.best()
         shortest = own.refinement.shortest
         if not np.isfinite(shortest):  # there is time for least energy
             if not work.exhausted:
                 own.refine_exactly()
             return own.best(), shortest
 
+    compared = _Comparison(context, own)
     free = _optimised_again(own, context.asking("time_and_energy"))
-    best, duration = _with_others(best, [free], context)
-    shortest = min(shortest, duration)
-    if duration <= context.options.duration:
-        return best, shortest
+    compared.consider(free)
+    if free is not None and free[1].trajectory.duration <= context.options.duration:
+        return compared.best, compared.shortest
 
     hasty = _explored(exploration, context.asking("time"))  # there is no time for least cost
-    best, duration = _with_others(best, [hasty.best()], context)
-    best, fastest = _with_faster(best, hasty, exploration, context)
-    return best, min(shortest, duration, fastest)
-
-
-def _with_faster(
-    best: Answer | None, own: Portfolio, exploration: Exploration, context: Context
-) -> tuple[Answer | None, float]:
-    """The cheapest of an answer and of the fast movements that other costs lead to, and the
-    shortest of these [s].
-    """
-    turning = _optimised_again(own, context.asking("movement_cost"))
-    hurried = _hurried(own.best(), exploration, context.asking("time"))
-    return _with_others(best, [turning, hurried], context)
-
-
-def _held_against_others(
-    best: Answer | None, exploration: Exploration, context: Context
-) -> Answer | None:
-    """The best answer of free duration, or a better one that other durations or J lead to."""
-    objective = context.options.objective
-    if objective == "energy" and best is not None:
-        return best[0], _least_over_durations(best[1], context)
-    if objective == "movement_cost":
-        other = _explored(exploration, context.asking("time_and_energy"))
-        return _cheaper(best, _as_asked(other.best(), context)[0])
-    return best
-
-
-def _hurried(best: Answer | None, exploration: Exploration, context: Context) -> Answer | None:
-    """The fastest movement near the best one for a high price of time: joules smooth the descent,
-    and lead to other local minima than time alone. None where that is far from the best one.
-    """
-    found = _explored(exploration, context.valuing_time(_HURRY)).best()
-    hurried = _as_asked(found, context)[0]
-    if hurried is None or (best is not None and hurried[1].cost > _NEAR * best[1].cost):
-        return None
-    method, movement = hurried
-    fastest = near(movement, context)
-    return _cheaper(hurried, None if fastest is None else (method, fastest))
+    compared.consider(hasty.best())
+    compared.consider_companions("time", hasty, exploration)
+    return compared.best, compared.shortest
 
 
 def _least_over_durations(best: Movement, context: Context) -> Movement:
@@ -254,18 +282,6 @@ def _as_asked(found: Answer | None, context: Context) -> tuple[Answer | None, fl
             return None, own
         movement = movement.stretched_by(max(requested / own, 1.0))
     return ((method, movement) if movement.prove().certified else None), own
-
-
-def _with_others(
-    best: Answer | None, others: list[Answer | None], context: Context
-) -> tuple[Answer | None, float]:
-    """The cheapest of an answer and of those of other objectives as answers to this request, and
-    the shortest of the others' own durations [s].
-    """
-    asked = [_as_asked(other, context) for other in others]
-    for answer, _ in asked:
-        best = _cheaper(best, answer)
-    return best, min(duration for _, duration in asked)
 
 
 def _cheaper(best: Answer | None, other: Answer | None) -> Answer | None:

@@ -2,7 +2,7 @@
 an entry point of an installed package, in the group `ir_planner.searches`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, is_dataclass
 from types import MappingProxyType
 from typing import Any, cast
@@ -57,24 +57,58 @@ def made_search(name: str, value: Any) -> Search:
     return cast(Search, search)
 
 
-_OWN: dict[str, Search] = {
-    "direct": Direct(),
-    "tree": Tree(),
-    "detours": Detours(),
-    "retract": Retract(),
-    "genetic": Genetic(),
-    "sbl": Sbl(),
-    "kpiece": Kpiece(),
-    "bkpiece": Bkpiece(),
-    "lbkpiece": Lbkpiece(),
-    "prm": Prm(),
-    "rrt": Rrt(),
-    "rrt_connect": RrtConnect(),
-    "aorrtc": Aorrtc(),
+@dataclass(frozen=True)
+class Role:
+    """Turns of a search in the default portfolio, 0: none.
+
+    first: among those for the first path, by what they cost where the straight movement collides
+    (benchmarks/regional.py). explores: among those that find paths of other homotopy classes with
+    another seed. costly: beside others not in their first round.
+    """
+
+    first: int = 0
+    explores: int = 0
+    costly: bool = False
+
+
+BY_NAME = Role()
+_OWN: dict[str, tuple[Search, Role]] = {
+    "direct": (Direct(), Role(first=1)),
+    "tree": (Tree(), Role(first=2, explores=2)),
+    "detours": (Detours(), Role(first=3, explores=1)),
+    "retract": (Retract(), Role(first=4)),
+    "genetic": (Genetic(), Role(explores=3, costly=True)),
+    "sbl": (Sbl(), BY_NAME),
+    "kpiece": (Kpiece(), BY_NAME),
+    "bkpiece": (Bkpiece(), BY_NAME),
+    "lbkpiece": (Lbkpiece(), BY_NAME),
+    "prm": (Prm(), BY_NAME),
+    "rrt": (Rrt(), BY_NAME),
+    "rrt_connect": (RrtConnect(), BY_NAME),
+    "aorrtc": (Aorrtc(), BY_NAME),
 }
 SEARCHES: Registry[Search] = Registry(
-    "ir_planner.searches", _OWN, made_search, stand_in=UnusableSearch, reserved=NAMES_OF_SETTINGS
+    "ir_planner.searches",
+    {name: search for name, (search, _) in _OWN.items()},
+    made_search,
+    stand_in=UnusableSearch,
+    reserved=NAMES_OF_SETTINGS,
 )
+
+
+def role_of(name: str) -> Role:
+    """The role of a search; installed packages' are asked by name only."""
+    return _OWN[name][1] if name in _OWN else BY_NAME
+
+
+def _in_turn(turn: Callable[[Role], int]) -> tuple[str, ...]:
+    """Names of the searches that have a turn, in its order."""
+    turns = {name: turn(role_of(name)) for name in _OWN}
+    return tuple(sorted((name for name in _OWN if turns[name]), key=turns.__getitem__))
+
+
+FIRST_SEARCHES = _in_turn(lambda role: role.first)
+EXPLORERS = _in_turn(lambda role: role.explores)
 
 
 def registered() -> Mapping[str, Search]:
