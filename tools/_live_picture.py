@@ -57,12 +57,18 @@ def _heard_at(analysis: Analysis, view: CellView, t: float) -> dict[str, Any]:
     assert joints is not None
     assert power is not None
     assert cell is not None
+    ended = [s.step.movement for s in analysis.steps if t - 1.0 / RATE <= s.step.end < t]
     step = next((s.step for s in reversed(analysis.steps) if s.step.start <= t < s.step.end), None)
     movement = step.movement if step is not None else None
     load = next((name for time, name in reversed(analysis.loads.observations) if time <= t), "none")
     q = joints.position[np.searchsorted(joints.time, t)]
     heard = Heard(
-        recording.cell_yaml, joints=cell.robot.joint_names, q=q, load=load, movement=movement
+        recording.cell_yaml,
+        joints=cell.robot.joint_names,
+        q=q,
+        load=load,
+        movement=movement,
+        ended=ended,
     )
     at = np.searchsorted(power.time, t)
     since = np.searchsorted(power.time, t - 1.0 / RATE)

@@ -99,7 +99,7 @@ def test_the_page_draws_plays_and_follows_the_file(browser: Any, tmp_path: Path)
         page.wait("document.getElementById('no-motion').hidden", PATIENCE)
         drawn = page.run("document.getElementById('view').toDataURL()")
         page.run("document.getElementById('play').click()")
-        page.wait("document.getElementById('now-shown').textContent.includes('kW')", PATIENCE)
+        page.wait("document.getElementById('now-shown').textContent.includes(' W')", PATIENCE)
         deadline = time.monotonic() + PATIENCE
         while page.run("document.getElementById('view').toDataURL()") == drawn:
             assert time.monotonic() < deadline, "the robot is not drawn anew"

@@ -313,7 +313,7 @@ def test_the_live_view_shows_what_comes_and_asks_for_bits(
     page.wait("document.getElementById('answer').textContent.includes('refused, <')")
     before = page.run("document.getElementById('view').toDataURL()")
     stream.add({"q": [1.5, -1.0, 1.0, 0.0, 1.0, 0.0], "w": [4000.0, 5000.0], "near": None})
-    page.wait("document.querySelector('#tiles b').textContent === '5000 W'")
+    page.wait("document.querySelector('#tiles b').textContent === '5 000 W'")
     wait_for(lambda: page.run("document.getElementById('view').toDataURL()") != before, page)
     x, y, wide, _ = page.middle("#power")
     page.drag((x - wide / 5, y + 60), (x + wide / 5, y + 60))
@@ -338,6 +338,49 @@ def test_the_live_view_shows_what_comes_and_asks_for_bits(
     page.close()
 
 
+STOP = "document.getElementById('stop')"
+IN_REACH = f"""(() => {{ const {{ x, y, width, height }} = {STOP}.getBoundingClientRect();
+    return {STOP}.contains(document.elementFromPoint(x + width / 2, y + height / 2)); }})()"""
+
+
+@pytest.mark.parametrize("size", [DESK, PHONE])
+def test_the_emergency_stop_is_always_in_reach_and_says_what_ends_it(
+    browser: Any,
+    live: tuple[LiveServer, Stream, list[tuple[str, bool]]],
+    size: tuple[int, int],
+) -> None:
+    server, stream, pressed = live
+    page = browser.open(server.address, *size, touch=size == PHONE)
+    page.wait(f"!{STOP}.disabled && document.getElementById('no-motion').hidden")
+    assert page.run("document.getElementById('standing').textContent") == ""
+    page.run("scrollTo({top: 1e6, behavior: 'instant'})")
+    page.frame()
+    assert page.run("scrollY") > 300
+    assert page.run(IN_REACH)
+    page.run(f"{STOP}.click()")
+    wait_for(lambda: pressed == [("emergency_stop", True)], page)
+    levels = {"ab": False, "move_enable": False, "emergency_stop": True}
+    stream.add({"in": levels, "out": {"alarm_stop": False}, "mode": "EMERGENCY_STOP"})
+    said = "document.getElementById('standing').textContent"
+    page.wait(f"{said}.includes('stop pressed')")
+    assert page.run(f"{STOP}.getAttribute('aria-pressed')") == "true"
+    page.run("scrollTo({top: 0, behavior: 'instant'})")
+    page.frame()
+    assert page.run(BOXES) == []
+    page.run(f"{AXE}; 0")
+    assert page.run(FOUND) == []
+    page.run(f"{STOP}.click()")
+    wait_for(lambda: pressed[1:] == [("emergency_stop", False)], page)
+    stream.add({"in": {**levels, "emergency_stop": False}})
+    page.wait(f"{said}.includes('confirm messages')")
+    stream.add({"out": {"alarm_stop": True}})
+    page.wait(f"{said}.includes('Held on the path')")
+    stream.add({"heard": {"driver": False}})
+    page.wait("document.getElementById('hold').disabled")
+    assert not page.run(f"{STOP}.disabled")  # who is silent may still hear it
+    page.close()
+
+
 def test_the_live_view_on_a_phone_only_watches_without_the_token(
     browser: Any, live: tuple[LiveServer, Stream, list[tuple[str, bool]]]
 ) -> None:
@@ -352,7 +395,7 @@ def test_the_live_view_on_a_phone_only_watches_without_the_token(
     page.wait(
         "[...document.querySelectorAll('#plc button')].filter((b) => !b.disabled).length === 1"
     )  # CSV
-    page.run("document.getElementById('hold').click()")
+    page.run("for (const id of ['stop', 'hold']) document.getElementById(id).click()")
     assert pressed == []
     assert page.faults == []
     page.close()

@@ -32,6 +32,7 @@ from ir_recorder.live.server import Answer, LiveServer, Site
 from ir_recorder.live.stream import Stream
 from ir_recorder.report.cell_scene import matrix
 from ir_recorder.report.data import page_content
+from ir_recorder.report.headline import driven_tiles
 from ir_recorder.report.number_text import (
     kilowatt_hours,
     millimetres,
@@ -377,7 +378,7 @@ class Session:
         step = motion.step(float(at))
         stage.hold(step.load, step.places, step.cell)
         stage.stand(step.at(float(at)), step.movement)
-        stage.note = f"{step.label}, {motion.watts(float(at)) / 1e3:.1f} kW"
+        stage.note = f"{step.label}, {watts(motion.watts(float(at)))}"
         self._say(hand=False, nearNow=True, **self._near())
 
     def _replay(self, _: bool) -> None:
@@ -392,12 +393,9 @@ class Session:
         self._motion = None
         self._draw(recorded_content(content, stage.cell))
         recording = analysis.recording
-        program = analysis.program
-        energy = program.whole.energy if program is not None else analysis.energy
-        length = program.whole.seconds if program is not None else analysis.seconds
         tiles: list[Json] = [
-            ["this run", kilowatt_hours(energy), f"in {seconds(length)}"],
-            ["peak power", watts(analysis.peak_power), "of a 10 ms reading"],
+            [tile.name, tile.value, "; ".join(filter(None, tile.notes))]
+            for tile in driven_tiles(analysis)
         ]
         kind = "Simulated, not measured" if recording.origin == "simulated" else "Measured"
         lines: list[Json] = ["The recording as it was driven; Plan again plans its cell."]

@@ -10,6 +10,7 @@ from ir_msgs_py.savings import one_sided
 from ir_recorder.analysis import Analysis, Finding, ProgramTotals, Share, Verdict, summary
 from ir_recorder.analysis.production import (
     DRIVES_ONLY,
+    Production,
     driven_and_predicted,
     drives_only,
     idle_watts,
@@ -154,11 +155,21 @@ def tiles(analysis: Analysis, costs: Costs | None = None) -> str:
     paid = (_yearly(analysis, prices), _saved(analysis))
     if analysis.recording.only_planned and program is None:
         return _html([*paid, *_planned(analysis)])
-    peak = Tile("peak power", watts(analysis.peak_power), ("of a 10 ms reading",))
     if program is None:
         none = Tile("program", "none executed", ("figures of the whole recording only",))
-        return _html([*paid, none, _recorded(analysis), peak, _clearance(analysis)])
-    return _html([*paid, _unshortened(program) or _whole(analysis, program), peak])
+        return _html([*paid, none, *driven_tiles(analysis)])
+    return _html([*paid, _unshortened(program) or _whole(analysis, program), _peak(analysis)])
+
+
+def driven_tiles(analysis: Analysis) -> list[Tile]:
+    """What was driven: its energy with what was predicted, its peak, and its least clearance."""
+    program = analysis.program
+    energy = _recorded(analysis) if program is None else _whole(analysis, program)
+    return [energy, _peak(analysis), _clearance(analysis)]
+
+
+def _peak(analysis: Analysis) -> Tile:
+    return Tile("peak power", watts(analysis.peak_power), ("of a 10 ms reading",))
 
 
 def paid_row(analysis: Analysis, costs: Costs) -> str:
@@ -318,8 +329,11 @@ def _saved(analysis: Analysis) -> Tile | None:
 
 def _yearly(analysis: Analysis, costs: Costs) -> Tile | None:
     cycle = production_of(analysis)
-    if cycle is None:
-        return None
+    return None if cycle is None else yearly_tile(cycle, costs)
+
+
+def yearly_tile(cycle: Production, costs: Costs) -> Tile:
+    """What a year of such cycles costs in the shifts."""
     energy = costs.energy_of_year(cycle).value
     co2 = f"{kilowatt_hours(energy)}, {kilograms(costs.co2(energy))} CO2"
     assumed = (

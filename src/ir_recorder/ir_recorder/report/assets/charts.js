@@ -100,6 +100,11 @@ function laneKey(place, lanes) {
       if (words && !meanings.has(words)) meanings.set(words, [variable, style, lane.label]);
     }
   }
+  place.hidden = !meanings.size;
+  const shown = [...meanings.keys()].join();
+  if (place.shown === shown) return;
+  place.shown = shown;
+  place.replaceChildren();
   let named = "";
   for (const [words, [variable, style, lane]] of meanings) {
     if (lane !== named) place.append(Object.assign(document.createElement("b"), { textContent: `${lane}: ` }));
@@ -111,7 +116,6 @@ function laneKey(place, lanes) {
     item.append(key, words);
     place.append(item);
   }
-  place.hidden = !meanings.size;
 }
 
 class TimeChart {

@@ -136,17 +136,18 @@ class LiveClearanceChart extends ClearanceChart {
   }
 
   const press = async (name, value) => {
-    find("answer").textContent = `${name} = ${value ? 1 : 0} …`;
+    const said = BIT_WORDS[name] || name;
+    find("answer").textContent = `${said} = ${value ? 1 : 0} …`;
     try {
       const reply = await fetch("/press", { method: "POST", headers: { "Content-Type": "application/json", "X-Live-Token": token },
         body: JSON.stringify({ name, value }) });
       const words = reply.ok ? await reply.json() : { done: false, sentence: await reply.text() };
-      find("answer").textContent = `${name} = ${value ? 1 : 0}: ${words.done ? "done" : "refused"}${words.sentence ? `, ${words.sentence}` : ""}`;
+      find("answer").textContent = `${said} = ${value ? 1 : 0}: ${words.done ? "done" : "refused"}${words.sentence ? `, ${words.sentence}` : ""}`;
     } catch {
-      find("answer").textContent = `${name}: the server has not answered`;
+      find("answer").textContent = `${said}: the server has not answered`;
     }
   };
-  const bits = new Bits(find("inputs"), find("outputs"), find("hold"), press, find("stop"));
+  const bits = new Bits(find("inputs"), find("outputs"), find("stop"), find("hold"), press);
   find("view-only").hidden = Boolean(token);
 
   const takeScene = async (number) => {
@@ -189,7 +190,11 @@ class LiveClearanceChart extends ClearanceChart {
     find("problem").hidden = !last.problem;
     find("problem").textContent = last.problem || "";
     showFigures(find("tiles"), figures(state, energyBefore === null ? null : last.energy - energyBefore));
-    bits.show(last, link() && Boolean(token));
+    bits.show(last, link() && Boolean(token), Boolean(token));
+    const stands = standing(last);
+    if (find("standing").textContent !== stands) find("standing").textContent = stands;
+    find("stopping").classList.toggle("stopped", isStopped(last));
+    laneKey(find("lane-key"), power.lanes);
     if (find("machines").shown !== last.machines) { find("machines").shown = last.machines; showMachines(find("machines"), last.machines); }
     if (last.contact) find("contacts").textContent = `${last.contact.number}, the last: ${last.contact.words}`;
     if (last.scene && last.scene !== sceneShown && last.scene !== sceneAsked) takeScene(last.scene).catch(() => { sceneAsked = ""; });

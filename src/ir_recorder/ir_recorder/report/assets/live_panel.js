@@ -14,7 +14,7 @@ const BIT_WORDS = { ab: "drive bus off", hib: "hibernate", ks: "cold start", eme
 
 /* Figures that a person looks for first: name, value, what explains it, and whether it is bad. */
 function figures(state, energy) {
-  const watts = state.w ? `${Math.round(state.w[1])} W` : "–", near = state.near, short = near && near[0] < state.bound;
+  const watts = state.w ? `${thousands(Math.round(state.w[1]))} W` : "–", near = state.near, short = near && near[0] < state.bound;
   const target = state.target && state.target !== state.mode ? `changes to ${modeWords(state.target)}` : "";
   const step = state.step, total = step && step.at[1] ? `step ${step.at[0]} of ${step.at[1]}` : "";
   return [
@@ -39,21 +39,34 @@ function showFigures(place, rows) {
   });
 }
 
-/* Buttons and lamps of bits, made when a bit is heard of first. */
+/* What the bits of stop and hold mean for the robot, and what ends it; "" where it may move. */
+const isStopped = (state) => Boolean((state.in || {}).emergency_stop) || (state.out || {}).alarm_stop === false;
+function standing(state) {
+  const levels = state.in || {};
+  if (levels.emergency_stop) return "Emergency stop pressed: motors off, brakes closed. Press it again to release it.";
+  if (isStopped(state)) return "Stopped, the button released: confirm messages, then drives on.";
+  return levels.move_enable === false ? "Held on the path. Press hold again to go on." : "";
+}
+
+/* Buttons and lamps of bits, made when a bit is heard of first; stop and hold are there from the beginning. */
 class Bits {
-  constructor(inputs, outputs, hold, press, stop) {
-    this.stop = stop;
+  constructor(inputs, outputs, stop, hold, press) {
     this.inputs = inputs;
     this.outputs = outputs;
-    this.hold = hold;
     this.press = press;
+    this.stop = stop;
+    this.hold = hold;
     this.made = new Map();
-    hold.addEventListener("click", () => press("move_enable", hold.getAttribute("aria-pressed") === "true"));
+    for (const button of [stop, hold]) button.addEventListener("click", () => press(button.dataset.bit, this.next(button)));
   }
-  show(state, allowed) {
+  /* The level that a press of a button asks for: hold is pressed while moving is not enabled. */
+  next(button) { return (button.getAttribute("aria-pressed") === "true") === (button === this.hold); }
+  show(state, allowed, token) {
     for (const [side, place, levels] of [["in", this.inputs, state.in], ["out", this.outputs, state.out]]) {
-      for (const [name, level] of Object.entries(levels || {})) this.bit(side, place, name, level, allowed);
+      for (const [name, level] of Object.entries(levels || {})) if (side !== "in" || name !== "emergency_stop") this.bit(side, place, name, level, allowed);
     }
+    this.stop.disabled = !token; /* whoever is silent may still hear it */
+    this.stop.setAttribute("aria-pressed", String(Boolean(state.in && state.in.emergency_stop)));
     this.hold.disabled = !allowed || !state.in;
     this.hold.setAttribute("aria-pressed", String(Boolean(state.in && state.in.move_enable === false)));
   }
@@ -68,7 +81,7 @@ class Bits {
         made.dataset.bit = name;
         made.addEventListener("click", () => this.press(name, made.getAttribute("aria-pressed") !== "true"));
       }
-      (name === "emergency_stop" && switchable ? this.stop : place).append(made);
+      place.append(made);
       this.made.set(key, made);
     }
     const made = this.made.get(key), value = made.querySelector("b"), words = typeof level === "boolean" ? (level ? "1" : "0") : level;

@@ -167,6 +167,7 @@ async function events(url, headers, take) {
     player.take();
     power.power = shown.power && { time: floats(shown.power.time), low: floats(shown.power.low), high: floats(shown.power.high) };
     power.take(shown.lanes || []);
+    laneKey(find("lane-key"), shown.lanes || []);
     clearance.parts = (shown.clearance || []).map((c) => ({ time: floats(c.time), low: floats(c.low), label: c.label }));
     clearance.bound = shown.safetyDistance;
     for (const part of document.querySelectorAll("#clearance")) {
