@@ -30,7 +30,14 @@ from ir_recorder.report import report_html, robots
 from ir_recorder.report.compare import comparison_html
 from ir_recorder.report.costs import Costs
 from ir_recorder.report.fleet import fleet_columns, fleet_html, member_of
-from ir_recorder.report.robots import common_peak, driven_joules, predicted_joules, robots_html
+from ir_recorder.report.robots import (
+    common_cycle,
+    common_demand,
+    common_peak,
+    driven_joules,
+    predicted_joules,
+    robots_html,
+)
 from ir_recorder.report.step_table import write_table
 from ir_recorder.report.tables import savings_lines
 
@@ -228,7 +235,17 @@ def test_several_robots_are_sums_of_each(walked: Analysis) -> None:
         "all together: energy": 2.0 * driven_joules(walked),
         "all together: predicted": 2.0 * predicted_joules(walked),
         "all together: peak": common_peak(both),
+        "energy of all": 2.0 * driven_joules(walked),
+        "common peak": common_peak(both),
+        "largest quarter of an hour": common_demand(both),
     }
+    cycle = common_cycle(both)
+    assert cycle is not None
+    assert cycle.energy == pytest.approx(2.0 * driven_joules(walked))
+    _, cycles = cycles_of(cycle.seconds, Costs())
+    exact["a year of such cycles"] = cycle.energy * cycles * Costs().production_price / 3.6e6
+    mean = cycle.energy / cycle.seconds
+    assert mean <= common_demand(both) < 1.2 * mean  # cycles are much shorter than the quarter
     for name, value in exact.items():
         (figure,) = READ.called(found, name)
         assert figure.shows(value), (figure, value)

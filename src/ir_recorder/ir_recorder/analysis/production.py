@@ -31,6 +31,7 @@ from ir_recorder.analysis.results import (
 )
 from ir_recorder.analysis.steps import step_label
 from ir_recorder.reading.recording import Recording
+from ir_values.arrays import FloatArray
 
 ENDED = "ended"  # outcome of a step
 PREDICTED = "predicted"
@@ -337,6 +338,13 @@ def demand_watts(analysis: Analysis, cycle: Production) -> float:
     joules = np.array([energy for _, energy in rows])
     if not len(rows) or seconds.sum() <= 0.0 or not np.isfinite(joules).all():
         return cycle.energy / cycle.seconds
+    return largest_quarter(seconds, joules)
+
+
+def largest_quarter(seconds: FloatArray, joules: FloatArray) -> float:
+    """The largest mean power [W] of a quarter of an hour of a cycle that is repeated: stretches
+    (N,) of so many seconds, in their order, each at its mean power.
+    """
     repeated = 2 + int(QUARTER / seconds.sum())
     ends = np.concatenate(([0.0], np.cumsum(np.tile(seconds, repeated))))
     energy = np.concatenate(([0.0], np.cumsum(np.tile(joules, repeated))))

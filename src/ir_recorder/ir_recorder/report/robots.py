@@ -1,5 +1,6 @@
-"""The page of a recording of several robots: each of them and all together, when each moved, waited
-and passed a zone, and what holds between them. Each robot has a page of its own beside it.
+"""The page of a recording of several robots: what a year of all together costs, each of them, when
+each moved, waited and passed a zone, and what holds between them. Each robot has a page of its own
+beside it.
 """
 
 from __future__ import annotations
@@ -10,12 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from ir_recorder.analysis import Analysis, Finding
+from ir_recorder.analysis.production import Production, largest_quarter, production_of
 from ir_recorder.analysis.results import StepResult
 from ir_recorder.analysis.robots import STAMPS, zone_passes
 from ir_recorder.analysis.tending import Span
+from ir_recorder.report.costs import Costs, assumed_section, yearly_money
 from ir_recorder.report.files import write_output
 from ir_recorder.report.gantt import Bar, Gantt, legend, mode_bars, together
-from ir_recorder.report.headline import failing, verdict
+from ir_recorder.report.headline import failing, verdict, yearly_tile
 from ir_recorder.report.number_text import DASH, seconds, text, watt_hours, watts
 from ir_recorder.report.page import PAGE_START, asset
 from ir_recorder.report.paid import Tile
@@ -33,8 +36,11 @@ def write_robots(
     return write_output(path, robots_html(analyses, checks).encode(), PAGE_START, roots)
 
 
-def robots_html(analyses: Mapping[str, Analysis], checks: Sequence[Finding]) -> str:
-    """The page as text."""
+def robots_html(
+    analyses: Mapping[str, Analysis], checks: Sequence[Finding], costs: Costs | None = None
+) -> str:
+    """The page as text; without `costs` with those that are assumed."""
+    prices = costs or Costs()
     first = next(iter(analyses.values()))
     cell = first.cell.name.rpartition(".")[0] if first.cell is not None else ""
     name = cell or first.recording.path.stem
@@ -47,29 +53,47 @@ def robots_html(analyses: Mapping[str, Analysis], checks: Sequence[Finding]) -> 
         f'<!doctype html><html lang="en"><head>{head}<title>{text(title)}</title>'
         f"<style>{asset('page.css')}</style></head><body><header><div><h1>{text(title)}</h1>"
         f'<p class="subtitle">{text(what)}</p></div>{verdict(checks)}</header><main>'
-        f'<section class="tiles">{_tiles(analyses)}</section>{failing(checks)}'
+        f'<section class="tiles">{_tiles(analyses, prices)}</section>'
+        f"{failing(checks)}"
         f"<section><h2>Energy and time of the programs</h2>{_table(analyses)}</section>"
         f"<section><h2>Who moved, waited and passed a zone when</h2>"
         f"{_figure(analyses)}</section>"
+        f"{assumed_section(prices)}"
         f'<details class="part" id="checks"><summary><h2>Checks</h2></summary>{check_table(checks)}'
         "</details></main>"
         f"<script>{asset('export.js')}\nexportButtons();</script></body></html>"
     )
 
 
-def _tiles(analyses: Mapping[str, Analysis]) -> str:
-    """What all robots took together, when, and how long they waited for each other."""
+def _tiles(analyses: Mapping[str, Analysis], costs: Costs) -> str:
+    """What a year costs, then what all robots took together, when, and how long they waited for
+    each other.
+    """
     every = analyses.values()
     energy = watt_hours(sum(map(driven_joules, every)))
-    predicted = f"predicted {watt_hours(sum(map(predicted_joules, every)))}"
+    predicted = (
+        f"predicted {watt_hours(sum(map(predicted_joules, every)))}, without waits for signals"
+    )
     waits = [f"{name} {seconds(sum(waited(a).values()))}" for name, a in analyses.items()]
+    cycle = common_cycle(analyses)
+    yearly = [] if cycle is None else [yearly_tile(cycle, costs), _demand(analyses, costs)]
     shown = (
+        *yearly,
         Tile("energy of all", energy, (predicted,)),
-        Tile("time", seconds(_whole(analyses).seconds), ("from the first step to the last",)),
         Tile("common peak", watts(common_peak(analyses)), ("of a 10 ms reading",)),
         Tile("waited for signals", waits[0], tuple(waits[1:])),
     )
     return "".join(tile.html() for tile in shown)
+
+
+def _demand(analyses: Mapping[str, Analysis], costs: Costs) -> Tile:
+    """The largest quarter of an hour of all together, and its price where one is given."""
+    power = common_demand(analyses)
+    price = ""
+    if costs.demand_price > 0.0:
+        price = f"{yearly_money(power / 1000.0 * costs.demand_price, costs.currency)} a year"
+    words = "mean power of all robots, cycle after cycle"
+    return Tile("largest quarter of an hour", watts(power), (words, price))
 
 
 def _table(analyses: Mapping[str, Analysis]) -> str:
@@ -109,12 +133,44 @@ def program_span(analysis: Analysis) -> Span:
 
 def driven_joules(analysis: Analysis) -> float:
     """Joules at the mains from the first step until the last one has ended, waits included."""
+    return _taken(analysis, program_span(analysis))
+
+
+def _taken(analysis: Analysis, span: Span) -> float:
+    """Joules at the mains in a span; NaN without a meter."""
     power = analysis.recording.power
     if power is None:
         return float("nan")
-    span = program_span(analysis)
     begin, end = np.interp([span.begin, span.end], power.time, power.energy)
     return float(end - begin)
+
+
+def common_cycle(analyses: Mapping[str, Analysis]) -> Production | None:
+    """The mean cycle of all robots together, from the first step of any until the last one of all
+    has ended: who is done sooner waits. None where a robot has no whole cycle of known energy.
+    """
+    span = _whole(analyses)
+    own = [production_of(analysis) for analysis in analyses.values()]
+    cycles = min((each.cycles for each in own if each is not None), default=0.0)
+    energy = sum(_taken(analysis, span) for analysis in analyses.values())
+    if None in own or cycles < 1.0 or not np.isfinite(energy):
+        return None
+    joules = energy / cycles
+    origin = next(iter(analyses.values())).recording.origin
+    return Production("all robots", origin, span.seconds / cycles, joules, joules, joules, cycles)
+
+
+def common_demand(analyses: Mapping[str, Analysis]) -> float:
+    """The largest mean power [W] of a quarter of an hour of all robots together, what was driven
+    repeated without a pause.
+    """
+    span = _whole(analyses)
+    meters = [a.recording.power for a in analyses.values() if a.recording.power is not None]
+    inside, _ = together(meters)
+    inside = inside[(inside > span.begin) & (inside < span.end)]
+    times = np.concatenate(([span.begin], inside, [span.end]))
+    joules = np.sum([np.interp(times, m.time, m.energy) for m in meters], axis=0)
+    return largest_quarter(np.diff(times), np.diff(joules))
 
 
 def predicted_joules(analysis: Analysis) -> float:
@@ -150,9 +206,9 @@ def _whole(analyses: Mapping[str, Analysis]) -> Span:
 
 
 _KINDS = {
-    "loaded": "robot moves; in a zone, the upper one of its two robots",
-    "empty": "pause of the program; in a zone, the lower one",
-    "late": "both robots in a zone",
+    "loaded": "robot moves, or is in a zone",
+    "empty": "pause of the program",
+    "late": "two robots in one zone",
 }
 
 
@@ -178,12 +234,14 @@ def _figure(analyses: Mapping[str, Analysis]) -> str:
         if analysis.recording.power is not None:
             chart.lane("mode", mode_bars(analysis.recording.power, span))
     for signal, passes in zone_passes(analyses).items():
-        styles = zip(passes.items(), ("loaded", "empty"), strict=True)
-        bars = [(style, each, robot) for (robot, spans), style in styles for each in spans]
-        chart.lane(signal, [*bars, *_both_inside(passes)])
+        both = _both_inside(passes)
+        for robot, spans in passes.items():
+            inside = [("loaded", each, f"{robot} in {signal}") for each in spans]
+            chart.lane(f"{signal}: {robot}", [*inside, *both])
     chart.power([a.recording.power for a in analyses.values() if a.recording.power is not None])
     drawn = chart.drawn("robots", "robots, zones and power")
-    return f'{legend(_KINDS)}<figure class="figure">{drawn}</figure>'
+    waits = '<p class="hint">Where nothing is drawn a robot waits for its turn.</p>'
+    return f'{waits}{legend(_KINDS)}<figure class="figure">{drawn}</figure>'
 
 
 def _bar(result: StepResult) -> Bar:

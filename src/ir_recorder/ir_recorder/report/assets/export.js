@@ -32,15 +32,21 @@ const SVG = (() => {
 
 /* A drawing with the colours it has on the page, and the font. */
 function svgOf(svg) {
-  const copy = svg.cloneNode(true), box = svg.viewBox.baseVal;
-  const from = [svg, ...svg.querySelectorAll("*")], to = [copy, ...copy.querySelectorAll("*")];
+  const copy = svg.cloneNode(true), from = [svg, ...svg.querySelectorAll("*")], to = [copy, ...copy.querySelectorAll("*")];
   from.forEach((element, k) => {
     const style = getComputedStyle(element);
     for (const name of ["fill", "stroke", "opacity", "font-size", "font-weight", "font-family"]) to[k].style.setProperty(name, style.getPropertyValue(name));
   });
-  copy.setAttribute("width", box.width);
-  copy.setAttribute("height", box.height);
-  return new XMLSerializer().serializeToString(copy);
+  const { width, height } = svg.getAttribute("viewBox") ? svg.viewBox.baseVal : svg.getBoundingClientRect(), style = getComputedStyle(svg);
+  copy.setAttribute("width", width);
+  copy.setAttribute("height", height);
+  if (svg.getAttribute("viewBox")) return new XMLSerializer().serializeToString(copy);
+  /* names stand in the padding */
+  const [left, right] = [parseFloat(style.paddingLeft), parseFloat(style.paddingRight)], whole = document.createElementNS(SVG, "svg");
+  for (const [key, value] of Object.entries({ x: left, width: width - left - right, overflow: "visible" })) copy.setAttribute(key, value);
+  for (const [key, value] of Object.entries({ width, height, viewBox: `0 0 ${width} ${height}` })) whole.setAttribute(key, value);
+  whole.append(copy);
+  return new XMLSerializer().serializeToString(whole);
 }
 
 /* Bars, which are boxes of the page, as a drawing. */
@@ -110,7 +116,7 @@ function exportButtons() {
     const name = canvas.dataset.name || canvas.getAttribute("aria-label");
     canvas.parentElement.after(button("PNG", name, () => canvas.toBlob((blob) => blob && download(fileName(name, "png"), "image/png", blob))));
   }
-  for (const svg of document.querySelectorAll("main .figure svg")) {
+  for (const svg of document.querySelectorAll("main .figure > svg")) {
     const name = svg.id || "figure";
     svg.parentElement.after(button("SVG", name, () => download(fileName(name, "svg"), "image/svg+xml", svgOf(svg))));
   }
