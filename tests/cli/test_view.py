@@ -240,7 +240,7 @@ def test_planning_is_cancelled_and_asked_for_again(view: View, path: Path) -> No
 def test_a_time_of_the_motion_has_its_step_power_and_nearest_pair(view: View) -> None:
     view.planned()
     view.browser.press("time", 0.5)
-    view.shows("regional", " kW", "nearest ")
+    view.shows("regional", " W", "nearest ")
     assert view.browser.state["hand"] is False
 
 
