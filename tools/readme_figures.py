@@ -14,7 +14,7 @@ from ir_msgs_py.savings import BeforeAfter
 from ir_planner import Planner
 from ir_planner.before_after import before_after_common
 from ir_recorder.analysis.production import Amount
-from ir_recorder.report.costs import J_PER_KWH, Costs, money
+from ir_recorder.report.costs import Costs, money
 from ir_recorder.report.number_text import millimetres, seconds, significant
 from ir_recorder.report.program_comparison import Year, year_of
 
@@ -48,7 +48,7 @@ def figures(found: BeforeAfter, costs: Costs) -> str:
         ),
         (
             "energy from the mains",
-            *(f"{side.report.energy / J_PER_KWH:.3f} kWh" for side in (today, planned)),
+            *(f"{side.report.energy / 3600.0:.0f} Wh" for side in (today, planned)),
             f"{100.0 * saving.share:.0f} % less: {saving.saved / 3600.0:.0f} Wh, "
             f"at 90 % between {within[0]} and {within[1]}",
         ),

@@ -50,7 +50,13 @@ def test_a_file_without_its_ending_is_meant_before_a_bundled_cell(
 
 @pytest.mark.parametrize(
     ("joules", "shown"),
-    [(0.0, "0 Wh"), (12.0, "0.00333 Wh"), (629.0, "0.175 Wh"), (44e3, "0.0122 kWh")],
+    [
+        (0.0, "0 Wh"),
+        (12.0, "0.00333 Wh"),
+        (629.0, "0.175 Wh"),
+        (44e3, "12.2 Wh"),
+        (4.4e6, "1.22 kWh"),
+    ],
 )
 def test_the_energy_of_a_small_robot_is_more_than_zeros(joules: float, shown: str) -> None:
     assert kilowatt_hours(joules / 3.6e6) == shown

@@ -207,15 +207,14 @@ def test_where_the_bound_left_out_nothing_the_study_says_so(laid: Laid) -> None:
     [
         (
             {},
-            "Placements are compared by J (energy of the drives + 500 W x seconds of the "
-            "movements).",
+            "Placements are compared by energy of the drives + 500 W x seconds of the movements.",
         ),
-        ({"cycle_times": (9.0,)}, "Placements are compared by joules at the mains per cycle."),
+        ({"cycle_times": (9.0,)}, "Placements are compared by energy at the mains per cycle."),
         (
             {"cycle_times": (0.0, 9.0), "time_value": 80.0},
-            "Placements are compared by J (energy of the drives + 80 W x seconds of the "
-            "movements) without a "
-            "cycle time, by joules at the mains per cycle in one, mean over 2 conditions.",
+            "Placements are compared by energy of the drives + 80 W x seconds of the "
+            "movements without a "
+            "cycle time, by energy at the mains per cycle in one, mean over 2 conditions.",
         ),
     ],
 )

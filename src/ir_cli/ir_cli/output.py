@@ -112,10 +112,10 @@ def number(digits: int, scale: float = 1.0) -> Callable[[Any], str]:
 
 
 def kilowatt_hours(value: Any) -> str:
-    """Energy [kWh] as it is paid for; Wh where kWh would be 0.00.."""
+    """Energy [kWh] as it is paid for; Wh below one."""
     if value is None or not math.isfinite(value):
         return NOTHING
-    return f"{value:.4f} kWh" if abs(value) >= 0.01 else f"{1e3 * value:.3g} Wh"
+    return f"{value:.2f} kWh" if abs(value) >= 1.0 else f"{1e3 * value:.3g} Wh"
 
 
 def text(value: Any) -> str:

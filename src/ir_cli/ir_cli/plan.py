@@ -281,9 +281,10 @@ def sentences_of(plan: ProgramPlan, planner: Planner) -> list[str]:
     totals = totals_of(plan)
     standing = totals["seconds"] - totals["moving_seconds"]
     waiting = totals["joules"] - totals["moving_joules"]
-    energy = kilowatt_hours(totals["joules"] / J_PER_KWH)
-    if totals["joules"] < 1e-2 * J_PER_KWH:
-        energy = f"{energy} ({totals['joules']:.0f} J)"
+    paid = kilowatt_hours(totals["joules"] / J_PER_KWH)
+    joules = totals["joules"]
+    shown = f"{joules:.0f} J" if plan.report.energy_high < 1e5 else f"{joules / 1e3:.1f} kJ"
+    energy = f"{shown} ({paid})"
     proof = "free of collision and within all limits at every instant, proved"
     if all(step.is_pause for step in plan.movements):
         proof = "nothing moves"

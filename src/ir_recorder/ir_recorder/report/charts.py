@@ -65,7 +65,7 @@ _Units = tuple[float, tuple[str, float], tuple[str, float]]
 _SECONDS: _Units = (600.0, ("min", 60.0), ("s", 1.0))
 _ENERGIES: dict[Callable[[float], str], _Units] = {
     joules: (10_000.0, ("kJ", 1e3), ("J", 1.0)),
-    kilowatt_hours: (36_000.0, ("kWh", 3.6e6), ("Wh", 3600.0)),
+    kilowatt_hours: (3.6e6, ("kWh", 3.6e6), ("Wh", 3600.0)),
 }
 
 
@@ -108,7 +108,7 @@ def front_section(analysis: Analysis, planned: Sequence[ProgramPoint] = ()) -> s
     return front_part(points)
 
 
-def front_part(points: Sequence[Point], show: Callable[[float], str] = joules) -> str:
+def front_part(points: Sequence[Point]) -> str:
     """Section of the page: the drawing, or bars of energy where all programs take one time but for
     a hundredth; "" for fewer than two points.
     """
@@ -117,13 +117,13 @@ def front_part(points: Sequence[Point], show: Callable[[float], str] = joules) -
     if _one_time(points):
         hint = "All take the same time but for a hundredth, so their energies are what differs."
         head = f'<h2>Energy of a cycle</h2><p class="hint">{hint}</p>'
-        return f'<section id="front">{head}{_energy_bars(points, show)}</section>'
+        return f'<section id="front">{head}{_energy_bars(points)}</section>'
     joined = len(pareto(points)) > 1
     hint = "Left is faster, down is cheaper" + (
         "; the line joins programs that no other one beats in both." if joined else "."
     )
     head = f'<h2>Energy over cycle time</h2><p class="hint">{hint}</p>'
-    return f'<section id="front">{head}{front_chart(points, show=show)}</section>'
+    return f'<section id="front">{head}{front_chart(points, show=kilowatt_hours)}</section>'
 
 
 def _one_time(points: Sequence[Point]) -> bool:
@@ -131,20 +131,20 @@ def _one_time(points: Sequence[Point]) -> bool:
     return max(times) - min(times) < _SAME_TIME * max(times)
 
 
-def _energy_bars(points: Sequence[Point], show: Callable[[float], str]) -> str:
+def _energy_bars(points: Sequence[Point]) -> str:
     """A bar for each program, with the whisker of its interval."""
     rows = []
     for point in points:
         name = point.name or "program of the front"
-        words = show(point.energy)
-        notes = (f"{point.source}, in {seconds(point.seconds)}", _between(point, show))
+        words = kilowatt_hours(point.energy)
+        notes = (f"{point.source}, in {seconds(point.seconds)}", _between(point))
         piece = Piece(point.style, f"{name} {words}", point.energy)
         rows.append(Row(name, (piece,), words, notes, whisker=(point.low, point.high)))
     return bars(rows, "energy of a cycle")
 
 
-def _between(point: Point, show: Callable[[float], str]) -> str:
-    return span_of(point.low, point.high, show) if point.low < point.high else ""
+def _between(point: Point) -> str:
+    return span_of(point.low, point.high, kilowatt_hours) if point.low < point.high else ""
 
 
 def pareto(points: Sequence[Point]) -> list[Point]:

@@ -94,7 +94,7 @@ def comparison_html(compared: Sequence[Compared], costs: Costs | None = None) ->
         "supply": "" if any(map(drives_only, analyses)) else ", at the mains",
         "assumed": assumed_section(costs or Costs()),
         "figures": _figures(compared, names),
-        "front": front_part(_points(analyses, names), kilowatt_hours),
+        "front": front_part(_points(analyses, names)),
         "steps": _steps(analyses, names),
         "style": asset("page.css"),
         "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),

@@ -55,7 +55,7 @@ def watts(value: float) -> str:
 
 
 def kilowatt_hours(value: float) -> str:
-    """Joules as kWh with three significant digits, whole ones from 100 on, Wh below 0.01 kWh, and
+    """Joules as kWh with three significant digits, whole ones from 100 on, Wh below 1 kWh, and
     joules below 0.01 Wh.
     """
     if not math.isfinite(value):
@@ -63,7 +63,7 @@ def kilowatt_hours(value: float) -> str:
     if _NO_JOULES <= abs(value) < 36.0:
         return f"{significant(value, 3)} J"
     kwh = value / 3.6e6 if abs(value) >= _NO_JOULES else 0.0
-    if abs(kwh) < 0.01:
+    if abs(kwh) < 1.0:
         return f"{significant(1e3 * kwh, 3)} Wh"
     return f"{_fixed(kwh, 0) if abs(kwh) >= 100.0 else significant(kwh, 3)} kWh"
 

@@ -433,7 +433,7 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
         "assumed": assumed_section(prices),
         "changes": change_table(found, cell, prices),
         "hops": hop_table(found),
-        "front": front_part(_points(there), kilowatt_hours),
+        "front": front_part(_points(there)),
         "choices": "".join(_choice(side, found.towards) for side in there[1:]),
         "style": asset("page.css") + asset("before_after.css"),
         "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),

@@ -21,7 +21,6 @@ from ir_recorder.report.costs import Costs, assumed_section, cycles_of_year, yea
 from ir_recorder.report.files import write_output
 from ir_recorder.report.number_text import (
     DASH,
-    joules,
     kilowatt_hours,
     millimetres,
     percent,
@@ -86,7 +85,7 @@ def legend(low: float, high: float) -> str:
     keys = (
         f'<span><svg class="cost key" viewBox="-7.5 -7.5 15 15">'
         f'<circle r="{_radius(one):.1f}" style="fill:{one}"/></svg>'
-        f"{text(joules(float(at)))} …</span>"
+        f"{text(kilowatt_hours(float(at)))} …</span>"
         for one, at in zip(_COLOURS, steps, strict=False)
         if math.isfinite(low)
     )
@@ -395,7 +394,7 @@ def _mark_of(one: Known, cost: float, limits: tuple[float, float]) -> tuple[str,
     if one.cost == math.inf:
         return "cross", "", f"{one.placement.key}: {one.reason[0]}"
     kind, words = ("dot", "") if math.isfinite(one.cost) else ("open", "about ")
-    return kind, colour(cost, *limits), f"{one.placement.key}: {words}{joules(cost)}"
+    return kind, colour(cost, *limits), f"{one.placement.key}: {words}{kilowatt_hours(cost)}"
 
 
 def _charts(
@@ -418,7 +417,7 @@ def _chart(variable: Variable, known: Sequence[Known], low: float, high: float) 
         x = _LEFT + (_CHART - _LEFT - 10.0) * (value - variable.low) / width
         y = 10.0 + (_HIGH - _BELOW - 10.0) * (1.0 - min((one.cost - low) / (high - low), 1.0))
         given = one.placement.key == GIVEN.key
-        words = f"{variable.name} {value:g} {variable.unit}: {joules(one.cost)}"
+        words = f"{variable.name} {value:g} {variable.unit}: {kilowatt_hours(one.cost)}"
         marks.append(mark(x, y, "given" if given else "dot", colour(one.cost, low, high), words))
     ends_of = ((_LEFT, "start", variable.low), (_CHART - 10.0, "end", variable.high))
     numbers = [
@@ -426,14 +425,14 @@ def _chart(variable: Variable, known: Sequence[Known], low: float, high: float) 
         f"{variable.unit}</text>"
         for x, anchor, value in ends_of
     ]
-    decimals = max(1, 1 - math.floor(math.log10(max(high - low, 1e-9) / 1e3)))
+    decimals = max(0, 1 - math.floor(math.log10(max(high - low, 1e-6) / 3600.0)))
     numbers += [
-        f'<text x="{_LEFT - 6:g}" y="{y:g}" text-anchor="end">{value / 1e3:.{decimals}f}</text>'
+        f'<text x="{_LEFT - 6:g}" y="{y:g}" text-anchor="end">{value / 3600.0:.{decimals}f}</text>'
         for y, value in ((16.0, high), (_HIGH - _BELOW, low))
     ]
     line = f'<path class="grid" d="M{_LEFT:g} 8V{_HIGH - _BELOW + 4:g}H{_CHART - 6:g}"/>'
     return (
-        f"<figure><figcaption>{text(variable.name)} (kJ)</figcaption>"
+        f"<figure><figcaption>{text(variable.name)} (Wh)</figcaption>"
         f'<svg class="over" viewBox="0 0 {_CHART:g} {_HIGH:g}" role="img" '
         'aria-label="Cost over '
         f'{text(variable.name)}">{line}{"".join((*numbers, *marks))}</svg></figure>'

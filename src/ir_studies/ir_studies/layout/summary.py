@@ -153,8 +153,8 @@ def sentences(
 
 def cost_words(settings: LayoutSettings) -> str:
     """What placements are compared by."""
-    free = f"J (energy of the drives + {settings.time_value:g} W x seconds of the movements)"
-    timed = "joules at the mains per cycle"
+    free = f"energy of the drives + {settings.time_value:g} W x seconds of the movements"
+    timed = "energy at the mains per cycle"
     kinds = [free] * (not all(settings.cycle_times)) + [timed] * settings.in_cycles
     over = f", mean over {count} conditions" if (count := len(settings.conditions)) > 1 else ""
     by = f"{free} without a cycle time, by {timed} in one" if len(kinds) > 1 else kinds[0]

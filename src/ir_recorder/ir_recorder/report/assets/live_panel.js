@@ -18,7 +18,7 @@ function figures(state, energy) {
   const target = state.target && state.target !== state.mode ? `changes to ${modeWords(state.target)}` : "";
   const step = state.step, total = step && step.at[1] ? `step ${step.at[0]} of ${step.at[1]}` : "";
   return [
-    ["power at the mains", watts, energy === null ? "" : `${energy >= 3.6e5 ? `${(energy / 3.6e6).toFixed(2)} kWh` : `${(energy / 3600).toFixed(1)} Wh`} since this page was opened`],
+    ["power at the mains", watts, energy === null ? "" : `${energy >= 3.6e6 ? `${(energy / 3.6e6).toFixed(2)} kWh` : `${(energy / 3600).toFixed(1)} Wh`} since this page was opened`],
     ["mode", state.w ? modeWords(state.mode) || "–" : "–", target],
     ["step of the program", step ? step.label : "–", step ? [total, step.event === "started" ? "runs" : step.event, step.note].filter(Boolean).join(", ") : "no program was run"],
     ["nearest pair", near ? `${(near[0] * 1000).toFixed(0)} mm` : "–", near ? `${near[7]}${short ? `, below the safety distance of ${+(state.bound * 1000).toFixed(1)} mm` : ""}` : "", short],
