@@ -64,7 +64,7 @@ def figures(found: BeforeAfter, costs: Costs) -> str:
             "",
         ),
         (
-            "nearest to anything",
+            "minimum clearance",
             *(millimetres(side.report.min_clearance) for side in (today, planned)),
             "proved" if planned.certified else "not certified",
         ),
