@@ -4,7 +4,7 @@ Neighbours are left out: their bodies meet at the joint. Others that are near in
 near by construction: they keep a distance of their own, so that capsules that are wider than the
 bodies leave the robot its work. It is never below what the capsules were seen to be apart in a
 posture in which what they stand for meets: each piece of a link's surface stands for one capsule,
-the narrowest that holds it. Pieces within their radii are told apart by their triangles.
+the narrowest that holds it. Triangles of both surfaces tell whether they meet.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ir_description import Capsule
-from ir_description.files.convex_pieces import fine_triangles, halved, point_triangle
+from ir_description.files.convex_pieces import fine_triangles, halved
 from ir_description.files.making import LinkBody, UrdfArm, beside_axis
 from ir_description.robot import ReducedDistance
-from ir_kernels import Chain, CollisionModel
+from ir_kernels import Chain, CollisionModel, Surface
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 SAFETY = 0.02
@@ -54,10 +54,8 @@ _AROUND = 24
 _STEPS = (0.06, 0.03, 0.015, 0.008)  # of the range of each joint
 _NEAREST = 5e-4  # m: surfaces that are nearer count as meeting
 _ROUGHLY = 2e-3  # m: the same where rings are counted
-_TRIANGLES = 6_000_000  # pairs, after which two capsules are told apart by the pieces' radii
-_IN_RINGS = 300  # pieces of a side that are looked at for rings in a posture, about
+_BOXES = 300_000_000  # pairs, after which two capsules count as if their surfaces met
 _COUNTED = 16  # postures in which rings are counted
-_AT_ONCE = (30, 300)  # pieces, the nearest first, before all others are looked at
 
 
 class Pairs(NamedTuple):
@@ -169,124 +167,47 @@ def kept_sentences(reduced: Sequence[ReducedDistance], capsules: Sequence[Capsul
 
 
 class _Pieces(NamedTuple):
-    """Pieces of a surface, in balls of a radius (N,) [m] around `at` (N, 3): triangles (T, 3, 3) of
-    a piece (T,), which stand for what is within `beside` (T,) [m] of them.
+    """Pieces of a surface around points `at` (N, 3): triangles (T, 3, 3) of a piece (T,), which
+    stand for what is within `beside` (T,) [m] of them.
     """
 
     at: FloatArray
-    radius: FloatArray
     triangles: FloatArray
     piece: IntArray
     beside: FloatArray
 
     @classmethod
     def none(cls) -> _Pieces:
-        return cls(
-            np.zeros((0, 3)),
-            np.zeros(0),
-            np.zeros((0, 3, 3)),
-            np.zeros(0, dtype=int),
-            np.zeros(0),
-        )
+        return cls(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros(0, dtype=int), np.zeros(0))
 
     @classmethod
     def balls(cls, at: FloatArray, radius: float) -> _Pieces:
         """Balls around points (N, 3), all of one radius [m]."""
-        around = np.full(len(at), radius)
-        return cls(at, around, np.repeat(at[:, None], 3, axis=1), np.arange(len(at)), around)
+        points = np.repeat(at[:, None], 3, axis=1)
+        return cls(at, points, np.arange(len(at)), np.full(len(at), radius))
 
     def and_of(self, other: _Pieces) -> _Pieces:
         """These and others behind them."""
         joined = [np.concatenate(both) for both in zip(self, other, strict=True)]
-        joined[3][len(self.piece) :] += len(self.at)
+        joined[2][len(self.piece) :] += len(self.at)
         return _Pieces(*joined)
 
 
-class _Surface:
-    """Pieces of a surface, and trees of them and of their triangles."""
+class _Piecewise:
+    """A surface in pieces."""
 
     def __init__(self, pieces: _Pieces) -> None:
-        order = np.argsort(pieces.piece, kind="stable")
-        self.pieces = pieces._replace(
-            triangles=pieces.triangles[order],
-            piece=pieces.piece[order],
-            beside=pieces.beside[order],
-        )
-        self.tree = cKDTree(pieces.at)
-        self._first = np.searchsorted(self.pieces.piece, np.arange(len(pieces.at) + 1))
-        self._centre = self.pieces.triangles.mean(axis=1)
-        self._radius = _radii(self.pieces.triangles, self._centre) + self.pieces.beside
-        self._facets = cKDTree(self._centre)
+        self.pieces = pieces
+        self.surface = Surface(pieces.triangles, pieces.beside)
 
-    def near(self, other: _Surface, facing: Capsule, pose: FloatArray) -> IntArray:
-        """Pieces that may meet another surface, which stands for a capsule, by their radii, the
-        nearest first; pose: of this one in the other one.
-        """
-        middle = pose[:3, :3].T @ (0.5 * (facing.p0 + facing.p1) - pose[:3, 3])
-        reach = 0.5 * float(np.linalg.norm(facing.p1 - facing.p0)) + facing.radius
-        radius = self.pieces.radius
-        widest = float(radius.max(initial=0.0))
-        chosen = np.array(self.tree.query_ball_point(middle, reach + widest), dtype=int)
-        at = self.pieces.at[chosen] @ pose[:3, :3].T + pose[:3, 3]
-        inside = beside_axis(at, facing.p0, facing.p1) <= facing.radius + radius[chosen]
-        chosen = chosen[inside]
-        if not (len(chosen) and len(other.pieces.at)):
-            return chosen[:0]
-        most = float(other.pieces.radius.max())
-        limit = most + float(radius[chosen].max())
-        far, _ = other.tree.query(at[inside], distance_upper_bound=limit)
-        beyond = far - radius[chosen] - most
-        order = np.argsort(beyond, kind="stable")
-        return np.asarray(chosen[order][beyond[order] <= 0.0])
+    def of_pieces(self, which: BoolArray) -> Surface:
+        """The pieces (N,) alone."""
+        rows = which[self.pieces.piece]
+        return Surface(self.pieces.triangles[rows], self.pieces.beside[rows])
 
-    def meeting(
-        self, chosen: IntArray, pose: FloatArray, other: _Surface, near: float, first: bool
-    ) -> tuple[IntArray, int]:
-        """Which of the chosen pieces are nearer than `near` [m] to another surface, none that are
-        farther, and how many pairs of triangles were looked at for it; pose: of this one in the
-        other one. first: whether some of the pieces are enough.
-        """
-        count = self._first[chosen + 1] - self._first[chosen]
-        begin = np.cumsum(count) - count
-        rows = np.repeat(self._first[chosen] - begin, count) + np.arange(count.sum())
-        triangles = self.pieces.triangles[rows] @ pose[:3, :3].T + pose[:3, 3]
-        beside = self.pieces.beside[rows]
-        piece = self.pieces.piece[rows]
-        centre = triangles.mean(axis=1)
-        radius = _radii(triangles, centre)
-        reach = radius + beside + near + other._radius.max(initial=0.0)
-        found = other._facets.query_ball_point(centre, reach)
-        row = np.repeat(np.arange(len(centre)), [len(each) for each in found])
-        column = np.concatenate([*found, []]).astype(int)
-        met = np.zeros(len(self.pieces.at), dtype=bool)
-        looked_at = 0
-        while True:
-            apart = np.linalg.norm(centre[row] - other._centre[column], axis=1)
-            open_ = apart <= (radius + beside)[row] + near + other._radius[column]
-            row = row[open_]
-            column = column[open_]
-            looked_at += len(row)
-            if not len(row):
-                return np.flatnonzero(met), looked_at
-            apart = point_triangle(centre[row], other.pieces.triangles[column])
-            apart -= beside[row] + other.pieces.beside[column]
-            met[piece[row[apart <= near]]] = True
-            if first and met.any():
-                return np.flatnonzero(met), looked_at
-            open_ = (apart <= radius[row] + near) & (radius[row] > 0.0) & ~met[piece[row]]
-            used, inverse = np.unique(row[open_], return_inverse=True)
-            row = np.concatenate([inverse + k * len(used) for k in range(4)])
-            column = np.tile(column[open_], 4)
-            triangles = halved(halved(triangles[used]))
-            beside = np.tile(beside[used], 4)
-            piece = np.tile(piece[used], 4)
-            centre = triangles.mean(axis=1)
-            radius = _radii(triangles, centre)
-
-
-def _radii(triangles: FloatArray, centre: FloatArray) -> FloatArray:
-    """Of balls around points (T, 3) that hold triangles (T, 3, 3)."""
-    return np.asarray(np.linalg.norm(triangles - centre[:, None], axis=2).max(axis=1))
+    def touching(self, other: _Piecewise, pose: FloatArray) -> IntArray:
+        """Pieces that nearly meet another surface; pose: of this one in the other one."""
+        return np.unique(self.pieces.piece[self.surface.touching(other.surface, pose, _ROUGHLY)])
 
 
 class _Surfaces:
@@ -303,7 +224,7 @@ class _Surfaces:
         self._rounding = arm.rounding
         self._capsules = capsules
         self._bodies = bodies
-        self._known: dict[str, _Surface] = {}
+        self._known: dict[str, _Piecewise] = {}
 
     def capsules(self, link: int) -> list[Capsule]:
         """Those of a link."""
@@ -313,14 +234,14 @@ class _Surfaces:
         """Whether the URDF has a shape for it."""
         return bool(self._bodies[link])
 
-    def of(self, capsule: Capsule) -> _Surface:
+    def of(self, capsule: Capsule) -> _Piecewise:
         """What a capsule stands for: nothing for a link without a body, or where the others of its
         link are narrower and hold all.
         """
         if capsule.name not in self._known:
             own = self.capsules(capsule.link)
             for each, pieces in zip(own, self._shared(own), strict=True):
-                self._known[each.name] = _Surface(pieces)
+                self._known[each.name] = _Piecewise(pieces)
         return self._known[capsule.name]
 
     def _shared(self, capsules: Sequence[Capsule]) -> list[_Pieces]:
@@ -393,10 +314,7 @@ def _voxels(triangles: FloatArray, step: float, beside: float) -> _Pieces:
     which = np.unique(number, return_inverse=True)[1].ravel()
     count = np.bincount(which)
     at = np.stack([np.bincount(which, centres[:, k]) / count for k in range(3)], axis=1)
-    radius = np.zeros(len(at))
-    far = np.linalg.norm(triangles - at[which][:, None], axis=2).max(axis=1)
-    np.maximum.at(radius, which, far)
-    return _Pieces(at, radius + beside, triangles, which, np.full(len(triangles), beside))
+    return _Pieces(at, triangles, which, np.full(len(triangles), beside))
 
 
 def _thinned(rows: IntArray, most: int) -> IntArray:
@@ -444,11 +362,8 @@ class _Rings:
                 for side in (0, 1):
                     own = self.surfaces.of(pair[side])
                     other = self.surfaces.of(pair[1 - side])
-                    near = own.near(other, pair[1 - side], poses[side])
-                    chosen, _ = own.meeting(
-                        _thinned(near, _IN_RINGS), poses[side], other, _ROUGHLY, first=False
-                    )
-                    places, _ = self._cells(side, own.pieces.at[chosen])
+                    touching = own.touching(other, poses[side])
+                    places, _ = self._cells(side, own.pieces.at[touching])
                     met[side].update(map(tuple, places))
             for count, rings in zip(counts, met, strict=True):
                 count.update(rings)
@@ -500,10 +415,10 @@ class _Meeting:
         self._joints = np.arange(one.link, other.link)
         self._rings = rings
         self._surfaces = (rings.surfaces.of(one), rings.surfaces.of(other))
-        self._sides = tuple(each.pieces for each in self._surfaces)
-        self._counted = tuple(np.ones(len(each.at), dtype=bool) for each in self._sides)
+        fewer = int(np.argmin([len(each.pieces.triangles) for each in self._surfaces]))
+        self._counted = {fewer: self._surfaces[fewer].surface}
         self.built_so = ""
-        self._left = _TRIANGLES
+        self._left = _BOXES
 
     def largest_distance(self, usual: float) -> float:
         """What the capsules are apart at most [m] where the bodies meet, in all postures that were
@@ -512,17 +427,16 @@ class _Meeting:
         """
         if not all(self._rings.surfaces.has_body(each.link) for each in self._capsules):
             return 0.0
-        if not all(len(each.at) for each in self._sides):
+        if not all(len(each.pieces.at) for each in self._surfaces):
             return -np.inf
         distance = self._distances(self._q)
         found = self._found(distance, usual)
         if float((distance > found).mean()) >= _LEFT:
             return found
-        self._counted = tuple(
-            self._rings.away(side, pieces) for side, pieces in enumerate(self._sides)
-        )
-        if all(each.all() for each in self._counted):
+        away = [self._rings.away(k, each.pieces) for k, each in enumerate(self._surfaces)]
+        if all(each.all() for each in away):
             return found
+        self._counted = {k: each.of_pieces(away[k]) for k, each in enumerate(self._surfaces)}
         self.built_so = (
             "rings about a joint that do so in half of all, and what is within "
             f"{1e3 * _BESIDE:g} mm, are taken for built so"
@@ -576,30 +490,17 @@ class _Meeting:
         return np.asarray(self._model.distances(q)[:, 0])
 
     def _meet(self, q: FloatArray) -> BoolArray:
-        """Whether the surfaces meet, or are too near to tell (N,)."""
-        fewer = int(np.argmin([len(each.at) for each in self._sides]))
-        sides = (0, 1) if self.built_so else (fewer,)
+        """Whether the surfaces meet (N,); after very many pairs of boxes they count as if."""
         result = np.zeros(len(q), dtype=bool)
         one, other = (each.link for each in self._capsules)
-        for k, poses in enumerate(_relative(self._chain, one, other, q)):
-            result[k] = any(self._meets(side, poses[side]) for side in sides)
+        poses = _relative(self._chain, one, other, q)
+        for side, counted in self._counted.items():
+            open_ = np.flatnonzero(~result)
+            if len(open_):
+                facing = self._surfaces[1 - side].surface
+                met, looked_at = counted.meets(
+                    facing, poses[open_, side], _NEAREST, max(self._left, 0)
+                )
+                result[open_] = met
+                self._left -= looked_at
         return result
-
-    def _meets(self, side: int, pose: FloatArray) -> bool:
-        """Whether a piece of a side that counts meets the other one; after very many pairs of
-        triangles, whether it may by its radius.
-        """
-        other = self._surfaces[1 - side]
-        chosen = self._surfaces[side].near(other, self._capsules[1 - side], pose)
-        chosen = chosen[self._counted[side][chosen]]
-        for begin, end in itertools.pairwise((0, *_AT_ONCE, len(chosen))):
-            some = chosen[begin:end]
-            if not len(some):
-                break
-            if self._left <= 0:
-                return True
-            met, looked_at = self._surfaces[side].meeting(some, pose, other, _NEAREST, first=True)
-            self._left -= looked_at
-            if len(met):
-                return True
-        return False

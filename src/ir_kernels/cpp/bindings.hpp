@@ -13,3 +13,4 @@ void bind_inverse_kinematics(pybind11::module_& m);
 void bind_spline(pybind11::module_& m);
 void bind_search(pybind11::module_& m);
 void bind_portable(pybind11::module_& m);
+void bind_surfaces(pybind11::module_& m);

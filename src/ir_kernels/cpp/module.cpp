@@ -30,4 +30,5 @@ PYBIND11_MODULE(IR_MODULE, m) {
   bind_spline(m);
   bind_search(m);
   bind_portable(m);
+  bind_surfaces(m);
 }

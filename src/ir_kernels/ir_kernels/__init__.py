@@ -38,6 +38,7 @@ from ir_kernels.spline import (
     SplineValue,
 )
 from ir_kernels.spline_terms import SplineTerms, end_points
+from ir_kernels.surfaces import Surface
 
 __all__ = [
     "COLLIDES",
@@ -76,6 +77,7 @@ __all__ = [
     "SplineStarts",
     "SplineTerms",
     "SplineValue",
+    "Surface",
     "ThreeParallelIk",
     "TorqueBounds",
     "Witnesses",

@@ -305,15 +305,28 @@ def _best(
     directions = np.concatenate([_principal(outermost), np.eye(3)])
     if axis is not None and np.linalg.norm(axis) > 1e-9:
         directions = np.concatenate([directions, axis[None] / np.linalg.norm(axis)])
-    flat = outermost - (directions @ outermost.T)[:, :, None] * directions[:, None]
+    along = directions @ outermost.T
+    flat = outermost - along[:, :, None] * directions[:, None]
     centre = flat.mean(axis=1)
     rows = np.arange(len(directions))
     for k in range(1, rounds):  # Badoiu and Clarkson: towards the farthest point, ever shorter
-        far = flat[rows, np.argmax(((flat - centre[:, None]) ** 2).sum(axis=2), axis=1)]
+        far = flat[rows, np.argmax(_square(flat - centre[:, None]), axis=1)]
         centre = centre + (far - centre) / (k + 1)
-    lines = [*zip(centre, directions, strict=True)]
-    line = min(lines, key=lambda each: _volume(_along(outermost, *each)))
-    return _along(points, *line)
+    beside = _square(flat - centre[:, None])
+    square = beside.max(axis=1, keepdims=True)
+    cap = np.sqrt(square - beside)
+    low = (along + cap).min(axis=1)
+    high = (along - cap).max(axis=1)
+    middle = centre + 0.5 * (low + high)[:, None] * directions
+    ball = np.sqrt(_square(outermost - middle[:, None]).max(axis=1))
+    radius = np.where(low > high, ball, np.sqrt(square[:, 0]))
+    line = int(np.argmin(_volume(np.maximum(high - low, 0.0), radius)))
+    return _along(points, centre[line], directions[line])
+
+
+def _square(vectors: FloatArray) -> FloatArray:
+    """Squares (..) of the lengths of vectors (.., 3)."""
+    return np.asarray(np.einsum("...i,...i->...", vectors, vectors))
 
 
 def _along(points: FloatArray, centre: FloatArray, direction: FloatArray) -> CapsuleFit:
@@ -321,7 +334,7 @@ def _along(points: FloatArray, centre: FloatArray, direction: FloatArray) -> Cap
     the middle.
     """
     along = points @ direction
-    beside = ((points - along[:, None] * direction - centre) ** 2).sum(axis=1)
+    beside = _square(points - along[:, None] * direction - centre)
     square = float(beside.max())
     cap = np.sqrt(square - beside)
     low = float((along + cap).min())
@@ -334,6 +347,6 @@ def _along(points: FloatArray, centre: FloatArray, direction: FloatArray) -> Cap
     return CapsuleFit(centre + low * direction, centre + high * direction, radius, 0.0)
 
 
-def _volume(fit: CapsuleFit) -> float:
-    length = float(np.linalg.norm(fit.p1 - fit.p0))
-    return float(np.pi * fit.radius**2 * (length + 4.0 / 3.0 * fit.radius))
+def _volume(length: FloatArray, radius: FloatArray) -> FloatArray:
+    """Of capsules whose axes have these lengths [m]."""
+    return np.asarray(np.pi * radius**2 * (length + 4.0 / 3.0 * radius))
