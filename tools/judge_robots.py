@@ -210,7 +210,13 @@ def judged(source: RobotSource, count: int) -> tuple[bool, str]:
     """
     made = made_robot(source)
     judge = Judge(source, made)
-    parts = [_kinematics(judge, made), _distances(judge, made), verdict(judge, made.robot, count)]
+    parts = [where_it_is(judge, made), verdict(judge, made.robot, count)]
+    return all(good for good, _ in parts), "; ".join(line for _, line in parts)
+
+
+def where_it_is(judge: Judge, made: MadeRobot) -> tuple[bool, str]:
+    """Whether links stand where they should, and distances are what is said of them."""
+    parts = [_kinematics(judge, made), _distances(judge, made)]
     return all(good for good, _ in parts), "; ".join(line for _, line in parts)
 
 

@@ -92,6 +92,17 @@ def test_a_name_that_is_taken_or_none_is_refused(
     assert not (tmp_path / "package").exists()
 
 
+def test_the_folder_does_not_hide_the_installed_module(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Python takes a folder beside it for a package where pip installed the module as editable."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "search", NAME]) == 0
+    (folder,) = tmp_path.iterdir()
+    assert (folder / f"ir_search_{NAME}.py").is_file()
+    assert not folder.name.isidentifier()
+
+
 def test_nothing_is_overwritten(tmp_path: Path) -> None:
     folder = tmp_path / "package"
     assert main(["new", "search", NAME, "-o", str(folder)]) == 0

@@ -15,10 +15,11 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from ir_cli.home_posture import ROOMS
+from ir_cli.home_posture import ROOMS, Postures
 from ir_cli.main import main
 from ir_cli.robot_from_urdf import RobotSource, made_robot
 from ir_cli.self_pairs import SAFETY, pairs_of
+from ir_description import InvalidValueError
 from ir_description.files.making import urdf_arm
 from ir_description.robot import ReducedDistance
 from ir_kernels import Chain, CollisionModel
@@ -280,6 +281,28 @@ def test_links_that_lie_in_each_other_but_never_meet_keep_their_postures(tmp_pat
     assert all("were not seen to meet" in each.reason for each in nested)
     good, line = verdict(Judge(source, made), made.robot, POSTURES)
     assert good, line
+
+
+def test_a_linkage_that_fills_the_work_of_the_arm_is_named_with_the_remedy(tmp_path: Path) -> None:
+    """What a lever beside the planned axes can reach is a part of its link."""
+    lever = (
+        '<link name="lever"><collision><geometry><box size="0.1 0.02 0.02"/></geometry></collision>'
+        '</link><joint name="side" type="revolute"><parent link="link_2"/><child link="lever"/>'
+        '<axis xyz="0 1 0"/><mimic joint="joint_3"/><limit lower="-1" upper="1" velocity="1" '
+        'effort="1"/></joint></robot>'
+    )
+    path = tmp_path / "drawn.urdf"
+    path.write_text(urdf(1).replace("</robot>", lever))
+    made = made_robot(RobotSource(path, payload=5.0, mass=60.0))
+    limits = made.robot.position_min, made.robot.position_max
+    capsules = tuple(
+        replace(each, radius=2.0) if each.link == 2 else each for each in made.shapes.capsules
+    )
+    postures = Postures(made.arm, capsules, made.pairs, limits, np.full(6, np.inf), 5.0)
+    with pytest.raises(InvalidValueError, match=r"leave it out \(--without lever\)"):
+        postures.home()
+    made = made_robot(RobotSource(path, payload=5.0, mass=60.0, without=("lever",)))
+    assert any("lever is left out as asked" in note for note in made.notes)
 
 
 def test_a_capsule_whose_link_lies_in_narrower_ones_takes_no_postures(tmp_path: Path) -> None:

@@ -107,15 +107,30 @@ class Postures:
         }
         shares = ", ".join(f"{100.0 * good.mean():.0f} % {name}" for name, good in counts.items())
         worst = ""
+        swept = list[str]()
         if len(far) and far.min() < 1.0:
             pair = self._model.pairs[int(np.argmin(far))]
             worst = f"; nearest most often: {pair.body_a} and {pair.body_b}"
+            swept = self._swept({pair.body_a, pair.body_b})
         remedy = (
-            "machine_home_deg or gear_peak_torque_nm in a drive sheet (ir robot new --template)"
+            "give machine_home_deg or gear_peak_torque_nm in a drive sheet (ir robot new "
+            "--template)"
         )
-        if not counts["free of itself"].any():
+        if not counts["free of itself"].any() and swept:
+            words = " ".join(f"--without {link}" for link in swept)
             remedy = (
-                "collision shapes that are nearer to the real links, whose capsules overlap or "
-                "whose bodies meet wherever the joints turn, or leave one out (--without LINK)"
+                "what joints beside the planned axes carry fills all that they can reach: leave "
+                f"it out ({words})"
             )
-        return f"no machine home was found: of {_TRIED} postures are {shares}{worst}; give {remedy}"
+        elif not counts["free of itself"].any():
+            remedy = (
+                "give collision shapes that are nearer to the real links, whose capsules overlap "
+                "or whose bodies meet wherever the joints turn, or leave one out (--without LINK)"
+            )
+        return f"no machine home was found: of {_TRIED} postures are {shares}{worst}; {remedy}"
+
+    def _swept(self, names: set[str]) -> list[str]:
+        """What joints beside the planned axes move, of the links of capsules."""
+        links = {each.link for each in self._capsules if each.name in names}
+        shapes = [shape for link in sorted(links) for shape in self._arm.links[link].shapes]
+        return [*dict.fromkeys(shape.motions[-1].child for shape in shapes if shape.motions)]

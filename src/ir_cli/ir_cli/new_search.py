@@ -93,7 +93,7 @@ A search for free paths, asked for by its name only:
 def add_new_search(new: argparse.ArgumentParser) -> None:
     """Arguments of `ir new search`."""
     new.add_argument("name", metavar="NAME", help="letters, digits and underscores: over_the_top")
-    words = "folder to write (ir_search_NAME)"
+    words = "folder to write (ir-search-NAME)"
     new.add_argument("-o", "--output", type=Path, metavar="FOLDER", help=words)
     new.set_defaults(run=run_new_search)
 
@@ -106,7 +106,8 @@ def run_new_search(arguments: argparse.Namespace) -> int:
         "dashed": name.replace("_", "-"),
         "type": "".join(part.capitalize() for part in name.split("_")),
     }
-    folder = arguments.output or Path(f"ir_search_{name}")
+    # no name of a module: beside the folder, Python would import it instead of what is installed
+    folder = arguments.output or Path(f"ir-search-{words['dashed']}")
     folder.mkdir(parents=True, exist_ok=True)
     files = {"pyproject.toml": PROJECT, f"ir_search_{name}.py": MODULE, "README.md": README}
     for file, text in files.items():

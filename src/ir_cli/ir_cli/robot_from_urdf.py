@@ -183,7 +183,7 @@ def _folder(source: RobotSource) -> Path:
     return (source.drives or source.urdf).parent
 
 
-def write_robot(source: RobotSource, out: Path) -> None:
+def write_robot(source: RobotSource, out: Path) -> MadeRobot:
     """Write the robot file, and say how well it fits. Raises InputError, CommandError."""
     made = made_robot(source)
     errors = [each for each in remarks_on(made.robot) if each.severity == "error"]
@@ -195,6 +195,7 @@ def write_robot(source: RobotSource, out: Path) -> None:
     except OSError as error:
         raise CommandError(f"{out} can't be written: {error.strerror}") from error
     _say(out, made)
+    return made
 
 
 def _comments(source: RobotSource, shapes: Shapes, notes: Sequence[str]) -> list[str]:

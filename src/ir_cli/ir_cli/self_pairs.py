@@ -43,6 +43,7 @@ LEAST_LEFT = 0.1
 """Share of postures that two links must leave to be told apart by their capsules."""
 _VOXELS = 60  # along a capsule: one point stands for the surface in each
 _FINE = 0.006  # m: edge of a voxel of a link that is looked at more closely, at most
+_SMALL = 200_000  # triangles of a link that is looked at more closely
 _ALONG = 20  # points along a body that is a capsule
 _TOUCH = 1e-9  # m: of rounding, by which a corner may be out of its capsule
 _HALVINGS = 16
@@ -260,7 +261,7 @@ class _Surfaces:
                 size = float(np.linalg.norm(capsules[k].p1 - capsules[k].p0))
                 step = (size + 2.0 * capsules[k].radius) / _VOXELS
                 if capsules[k].link in self._finer:
-                    step = min(step, _FINE)
+                    step = min(step, max(_FINE, _coarse_enough(share)))
                 found[k] = found[k].and_of(_voxels(share, step, wider))
         return found
 
@@ -299,6 +300,15 @@ def _shared_out(triangles: FloatArray, capsules: Sequence[Capsule]) -> list[Floa
                 found[k].append(triangles[nearest == k])
         triangles = halved(triangles)
     return [np.concatenate(each) for each in found]
+
+
+def _coarse_enough(triangles: FloatArray) -> float:
+    """The edge of a voxel [m] with which a surface (T, 3, 3) has no more than some _SMALL
+    triangles.
+    """
+    a, b, c = triangles.swapaxes(0, 1)
+    doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
+    return float(np.sqrt(2.0 * doubled / _SMALL))
 
 
 def _voxels(triangles: FloatArray, step: float, beside: float) -> _Pieces:

@@ -36,11 +36,13 @@ _BODY = 0.5  # m: how far bodies reach beyond the frames of an arm, for a bound 
 
 @dataclass(frozen=True, eq=False)
 class SideMotion:
-    """A joint beside the planned axes: `pose` (4, 4) of its frame in the link that carries it,
-    `axis` (3,) in it, "revolute" or "prismatic", from `lower` to `upper` [rad or m].
+    """A joint beside the planned axes, which carries the link `child`: `pose` (4, 4) of its frame
+    in the link before, `axis` (3,) in it, "revolute" or "prismatic", from `lower` to `upper` [rad
+    or m].
     """
 
     joint: str
+    child: str
     kind: str
     pose: FloatArray
     axis: FloatArray
@@ -411,7 +413,7 @@ class _Gathering:
             lower = -np.pi
             upper = np.pi
         kind = "prismatic" if joint.kind == "prismatic" else "revolute"
-        return SideMotion(joint.name, kind, joint.pose, joint.axis, lower, upper)
+        return SideMotion(joint.name, joint.child, kind, joint.pose, joint.axis, lower, upper)
 
     def _range(self, joint: UrdfJoint, depth: int = 0) -> tuple[float, float]:
         """From where to where a joint moves: by its limits, or as what it follows does."""
