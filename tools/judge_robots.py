@@ -240,7 +240,9 @@ def _kinematics(judge: Judge, made: MadeRobot) -> tuple[bool, str]:
 
 
 def _distances(judge: Judge, made: MadeRobot) -> tuple[bool, str]:
-    """Of capsules against meshes, of links that are no neighbours."""
+    """Of capsules against meshes, of links that are no neighbours; links that hold all that joints
+    beside the axes can reach may be nearer.
+    """
     robot = made.robot
     link = {each.name: each.link for each in robot.capsules}
     far = [
@@ -254,6 +256,9 @@ def _distances(judge: Judge, made: MadeRobot) -> tuple[bool, str]:
         stated = sentence.partition("stands out ")[2].partition(" mm")[0]
         said[sentence.partition(":")[0]] = 1e-3 * float(stated) if stated else 0.0
     q = np.random.default_rng(7).uniform(robot.position_min, robot.position_max, (FEW, robot.n))
+    swept = {
+        k for k, each in enumerate(made.arm.links) if any(shape.motions for shape in each.shapes)
+    }
     counts: Counter[str] = Counter()
     most = 0.0
     for row, own in zip(q, model.distances(q), strict=True):
@@ -270,7 +275,7 @@ def _distances(judge: Judge, made: MadeRobot) -> tuple[bool, str]:
             true = judge.distance(one, other)
             counts["all"] += 1
             counts["above"] += 0.0 < true < least - TOUCH
-            if least > 0.0 and np.isfinite(true):
+            if least > 0.0 and np.isfinite(true) and not swept & {one, other}:
                 most = max(most, true - least)
                 counts["below"] += true - least > slack + TOUCH
     return not counts["above"] and not counts["below"], (

@@ -93,7 +93,7 @@ A search for free paths, asked for by its name only:
 def add_new_search(new: argparse.ArgumentParser) -> None:
     """Arguments of `ir new search`."""
     new.add_argument("name", metavar="NAME", help="letters, digits and underscores: over_the_top")
-    words = "folder to write (ir-search-NAME)"
+    words = "folder to write (NAME)"
     new.add_argument("-o", "--output", type=Path, metavar="FOLDER", help=words)
     new.set_defaults(run=run_new_search)
 
@@ -106,13 +106,15 @@ def run_new_search(arguments: argparse.Namespace) -> int:
         "dashed": name.replace("_", "-"),
         "type": "".join(part.capitalize() for part in name.split("_")),
     }
-    # no name of a module: beside the folder, Python would import it instead of what is installed
-    folder = arguments.output or Path(f"ir-search-{words['dashed']}")
+    # not the module's name: beside the folder, Python would import it instead of what is installed
+    folder = arguments.output or Path(name)
     folder.mkdir(parents=True, exist_ok=True)
     files = {"pyproject.toml": PROJECT, f"ir_search_{name}.py": MODULE, "README.md": README}
     for file, text in files.items():
         write_file(folder / file, text.format(**words), new=True)
-    sys.stdout.write(f"{folder}: pip install -e {folder}, then --planner {name}; see README.md\n")
+    sys.stdout.write(
+        f"{folder}: pip install -e {folder.resolve()}, then --planner {name}; see README.md\n"
+    )
     return 0
 
 
