@@ -88,7 +88,7 @@ def _beside_no_edge(points: FloatArray, triangles: FloatArray) -> BoolArray:
     for k in range(3):
         edge = triangles[:, (k + 1) % 3] - triangles[:, k]
         inside &= (np.cross(edge, points - triangles[:, k]) * normal).sum(axis=1) >= 0.0
-    return inside
+    return np.asarray(inside)
 
 
 def _goes_through(start: FloatArray, end: FloatArray, triangles: FloatArray) -> BoolArray:
@@ -98,7 +98,7 @@ def _goes_through(start: FloatArray, end: FloatArray, triangles: FloatArray) -> 
     high = ((end - triangles[:, 0]) * normal).sum(axis=1)
     through = ((low > 0.0) != (high > 0.0)) & (low != high)
     share = low / np.where(through, low - high, 1.0)
-    return through & _beside_no_edge(start + share[:, None] * (end - start), triangles)
+    return np.asarray(through & _beside_no_edge(start + share[:, None] * (end - start), triangles))
 
 
 def _normal(triangles: FloatArray) -> FloatArray:
