@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -114,7 +115,7 @@ def main() -> None:
         held = sum(round(row.fit) for row in table if row.movements)
         count = sum(row.movements for row in table)
         if asked.page is not None:
-            _write(asked.page, table)
+            _write(asked.page, list(_in_short(table)))
     if asked.folder is None or not asked.quick:
         from _truth_fit import driven
 
@@ -439,6 +440,20 @@ def _tx40_trace(folder: Path, robot: RobotModel) -> Trace:
         columns[name] = q[:, k].copy()
         columns[f"{name}_effort"] = effort[:, k].copy()
     return Trace("TX40", time, columns)
+
+
+def _in_short(table: Sequence[Row]) -> Iterator[Row]:
+    """For the page: splits of one data set as median and largest of their sizes."""
+    for data, group in groupby(table, key=lambda row: row.data):
+        rows = list(group)
+        splits = [row for row in rows if " to " in row.figure]
+        if len(splits) < 2:
+            yield from rows
+            continue
+        sizes = np.abs([[row.fit, row.sheet, row.regression] for row in splits])
+        for name, values in (("median", np.median(sizes, axis=0)), ("largest", sizes.max(axis=0))):
+            figure = f"work, {name} of {len(splits)} splits, %"
+            yield Row(data, figure, *(float(value) for value in values))
 
 
 def _write(page: Path, table: Sequence[Row]) -> None:
