@@ -291,6 +291,50 @@ def test_link_3_in_the_zone_is_not_outside(demo_scene: PlanningScene) -> None:
     assert np.array_equal(area.left(q, 0.02), (arm > 0.02) & (tool > 0.02))
 
 
+def test_link_2_may_stay_in_the_zone(demo_cell: Cell, power: PowerData) -> None:
+    """The zone is put into the upper arm at machine home."""
+    machine = demo_cell.machine("lathe")
+    home = np.array(demo_cell.machine_home)[None]
+    chain = scene_with(demo_cell, load_text(demo_cell), power).chain
+    upper_arm = max(
+        (one for one in demo_cell.robot.capsules if one.link == 2),
+        key=lambda one: float(np.linalg.norm(one.p1 - one.p0)),
+    )
+    middle = np.eye(4)
+    middle[:3, 3] = 0.5 * (upper_arm.p0 + upper_arm.p1)
+    inside = np.linalg.inv(machine.pose) @ chain.link_poses(home)[0, 2] @ middle
+    zone = replace(machine.zone_in_equipment, pose=inside, size=np.full(3, 0.05))
+    moved = replace(machine, zone_in_equipment=zone)
+    others = (one for one in demo_cell.equipment if one is not machine)
+    cell = replace(demo_cell, equipment=(*others, moved))
+    scene = scene_with(cell, load_text(cell), power)
+    assert WorkArea.of(scene, scene.station("lathe_work")).left(home, 0.02).all()
+
+
+@pytest.mark.parametrize("name", ["lathe_work", "gauge_measure"])
+def test_outside_is_beyond_the_zone_free_without_contacts_and_as_far_as_the_station_says(
+    demo_scene: PlanningScene, name: str
+) -> None:
+    """Judge: every condition by itself, over drawn configurations."""
+    problem = problem_at(demo_scene, name, a_budget())
+    robot = demo_scene.cell.robot
+    q = np.random.default_rng(1).uniform(robot.position_min, robot.position_max, (4000, 6))
+    q[:200] = problem.interaction + np.random.default_rng(2).normal(0.0, 0.05, (200, 6))
+    beyond = problem.area.zone_distance(q) > 0.02
+    clear = (demo_scene.collision.distances(q) > demo_scene.thresholds(0.02)).all(axis=1)
+    station = demo_scene.station(name)
+    tool = demo_scene.chain.tcp_poses(q)[:, :3, 3]
+    begins_outside = bool(problem.area.left(problem.interaction[None], 0.02)[0])
+    assert begins_outside == (name == "gauge_measure")
+    assert problem.least_distance == (station.approach_distance if begins_outside else 0.0)
+    far = np.linalg.norm(tool - station.pose[:3, 3], axis=1) >= station.approach_distance
+    expected = beyond & clear & (far | (not begins_outside))
+    assert np.array_equal(problem.is_out(q), expected)
+    assert expected.any()
+    assert (beyond & ~clear).any()
+    assert not begins_outside or (beyond & clear & ~far).any()
+
+
 @pytest.mark.parametrize("stuck", [False, True])
 @pytest.mark.parametrize("weighting", ["literal", "inverse"])
 def test_eq_7_as_printed_draws_normal_steps_around_the_mean(

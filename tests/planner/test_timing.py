@@ -242,10 +242,14 @@ def test_a_spline_through_points_keeps_its_limits(
     assert (np.abs(motion.qddd) <= limits.jerk * (1 + 1e-6)).all()
     for q in points:
         assert np.abs(trajectory.positions - q).max(axis=1).min() < 1e-9
+    torque = float(torque_use(demo_scene.dynamics, motion.q, motion.qd, motion.qdd).max())
+    assert torque <= limits.torque_share + 1e-3
+    first, second, *_, before, last = trajectory.times[1:]
+    assert (2.0 * first, last - before) == pytest.approx((second, before - trajectory.times[-3]))
     used = max(
         float((np.abs(motion.qd) / limits.velocity).max()),
         float((np.abs(motion.qdd) / limits.acceleration).max()),
-        float(torque_use(demo_scene.dynamics, motion.q, motion.qd, motion.qdd).max()),
+        torque,
     )
     assert used > 0.7, "the spline is slower than it needs to be"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,11 +12,11 @@ from ir_description import load_power_data
 from ir_msgs_py.savings import Saving
 from ir_recorder import Analysis, findings
 from ir_recorder.analysis.production import Amount, production_of
-from ir_recorder.report import report_html
+from ir_recorder.report import report_html, whole_line
 from ir_recorder.report.compare import comparison_html
 from ir_recorder.report.costs import Costs
 from ir_recorder.report.fleet import fleet_html, fleet_of_line, member_of
-from ir_recorder.report.whole_line import of_saving, of_whole_line
+from ir_recorder.report.whole_line import line_section, of_recording, of_saving, of_whole_line
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -52,6 +53,41 @@ def test_nobody_s_shares_are_table_1() -> None:
     assert found is not None
     assert "robots take 25.5 % and the hall 50 %" in found.sentence
     assert "25.5 % of the line's and 12.8 % of the factory's" in found.sentence
+
+
+def test_table_1_stands_in_four_groups_on_the_page() -> None:
+    costs = Costs()
+    assert costs.line == {
+        "robots": 25.5,
+        "stand_by": 4.5,
+        "technology": 7.0 + 9.5 + 1.5 + 2.0,
+        "infrastructure": 50.0,
+    }
+    page = line_section(of_saving(Saving(200.0, 100.0), costs), costs)
+    rows = [re.findall(r"<t[dh][^>]*>(.*?)</t[dh]>", row) for row in page.split("<tr")[2:]]
+    plain = [[re.sub(r"<.*?>", "", cell) for cell in row] for row in rows]
+    assert plain == [
+        ["robots", "25.5 %", "12.8 %"],
+        ["line stand-by", "4.5 %", "4.5 %"],
+        ["technology (welding, gluing, PLCs)", "20.0 %", "20.0 %"],
+        ["infrastructure (the hall)", "50.0 %", "50.0 %"],
+        ["the line, without its hall", "50.0 %", "37.2 %"],
+        ["the factory", "100.0 %", "87.2 %"],
+    ]
+
+
+def test_what_may_be_no_saving_and_what_leaves_the_controller_out_has_no_share(
+    analysis: Analysis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    costs = Costs()
+    assert of_saving(Saving(200.0, 100.0, saved_low=-1.0, saved_high=201.0), costs) is None
+    assert of_saving(Saving(200.0, 100.0, saved_low=1.0, saved_high=199.0), costs) is not None
+    cycle = production_of(analysis)
+    assert cycle is not None
+    for drives_only in (False, True):
+        said = replace(cycle, drives_only=drives_only)
+        monkeypatch.setattr(whole_line, "production_of", lambda _, said=said: said)
+        assert (of_recording(analysis, costs) is None) is drives_only
 
 
 def test_report_and_fleet_say_the_same(analysis: Analysis) -> None:

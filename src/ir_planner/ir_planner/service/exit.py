@@ -57,9 +57,7 @@ class WorkArea:
             scene,
             station,
             zone,
-            CollisionModel(scene.chain, [c for c in capsules if c.link > 0], bodies, ())
-            if bodies
-            else None,
+            CollisionModel(scene.chain, capsules, bodies, ()) if bodies else None,
             CollisionModel(scene.chain, inner, [box], ()) if inner else None,
         )
 
