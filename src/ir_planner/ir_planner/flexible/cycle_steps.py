@@ -151,8 +151,9 @@ class RouteSteps:
         if known not in self._proved:
             self._proved[known] = exact(movements[key], scene, station)
         found = self._proved[known]
-        if found.violation is not None:
-            sentence = f"{part.kind} {' to '.join(ends)}: {found.violation.sentence}"
+        violation = found.prove().violation
+        if violation is not None:
+            sentence = f"{part.kind} {' to '.join(ends)}: {violation.sentence}"
             raise StageError(Status(StatusCode.PLANNING_FAILED, sentence))
         return found
 
