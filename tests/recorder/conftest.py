@@ -9,7 +9,7 @@ import json
 import re
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -35,6 +35,7 @@ from ir_msgs.msg import (
 )
 from ir_msgs_py.modes import Mode
 from ir_recorder import Analysis, analyse, findings, read_recording
+from ir_recorder.analysis.tending import MachineTimes, PartRow, Span, TendedStep, Tending
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.format.schemas import SchemaLibrary
 from ir_recorder.recording.session import CellFiles, RecordingSession
@@ -411,6 +412,47 @@ def cell_yaml() -> str:
 @pytest.fixture(scope="session")
 def analysis(demo_file: Path) -> Analysis:
     return analyse(read_recording(demo_file))
+
+
+def tending_parts(analysis: Analysis) -> Analysis:
+    """The same run as if it had made two parts in a machine, the first of which filled the line."""
+    whole = Span(analysis.steps[0].step.start, analysis.steps[-1].step.end)
+    middle = 0.5 * (whole.begin + whole.end)
+    halves = (Span(whole.begin, middle), Span(middle, whole.end))
+    assert analysis.program is not None
+    each = 0.5 * analysis.program.whole.energy
+    parts = tuple(
+        PartRow(
+            k,
+            half,
+            each,
+            half.seconds - 0.2,
+            0.9 * each,
+            {"lathe": 0.4},
+            {"lathe": 0.2} if k == 2 else {},
+            {"lathe": 0.3, "machine_with_a_long_name": 0.1},
+        )
+        for k, half in enumerate(halves, start=1)
+    )
+    steps = tuple(
+        TendedStep(
+            result.step.movement,
+            result.step.start - 0.2 * (k % 2),
+            result.step.start,
+            result.step.end,
+            0.0,
+            result.energy,
+        )
+        for k, result in enumerate(analysis.steps)
+    )
+    machines = (MachineTimes("lathe", (halves[0],), (halves[1],)),)
+    return replace(analysis, tending=Tending(parts, 1, machines, steps))
+
+
+@pytest.fixture(scope="session")
+def tended() -> Callable[[Analysis], Analysis]:
+    """A run as if it had tended a machine."""
+    return tending_parts
 
 
 @pytest.fixture(scope="session")

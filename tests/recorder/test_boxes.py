@@ -170,6 +170,7 @@ def layout(_: Analysis) -> str:
 
 PAGES: dict[str, Callable[[Analysis], str]] = {
     "report": report,
+    "parts": report,
     "empty report": empty,
     "long names": long_names,
     "recordings": recordings,
@@ -184,10 +185,15 @@ PAGES: dict[str, Callable[[Analysis], str]] = {
 
 @pytest.mark.parametrize("name", PAGES)
 def test_nothing_is_cut_overlaps_or_scrolls_and_axe_finds_nothing(
-    browser: Any, analysis: Analysis, tmp_path: Path, name: str
+    browser: Any,
+    analysis: Analysis,
+    tended: Callable[[Analysis], Analysis],
+    tmp_path: Path,
+    name: str,
 ) -> None:
     path = tmp_path / "page.html"
-    path.write_text(PAGES[name](analysis), encoding="utf-8")
+    shown = tended(analysis) if name == "parts" else analysis
+    path.write_text(PAGES[name](shown), encoding="utf-8")
     faults = {}
     for size, (wide, high) in SIZES.items():
         page = browser.open(path, wide, high, touch=size == "phone", dark=size == "phone")
@@ -220,14 +226,15 @@ def page_pictures() -> ModuleType:
 
 @pytest.mark.long
 def test_pictures_of_every_page_are_left_to_look_at(
-    browser: Any, analysis: Analysis, tmp_path: Path
+    browser: Any, analysis: Analysis, tended: Callable[[Analysis], Analysis], tmp_path: Path
 ) -> None:
     """At a desk, on a phone and as PDF in out/pages: no judge of boxes sees what people see."""
     tool = page_pictures()
     PICTURES.mkdir(parents=True, exist_ok=True)
     for name, made in PAGES.items():
         path = tmp_path / "page.html"
-        path.write_text(made(analysis), encoding="utf-8")
+        shown = tended(analysis) if name == "parts" else analysis
+        path.write_text(made(shown), encoding="utf-8")
         base = PICTURES / name.replace(" ", "_")
         assert tool.draw(browser, str(path), base, unfold=False) == []
         assert all((PICTURES / f"{base.name}{end}").stat().st_size > 10_000 for end in ENDINGS)

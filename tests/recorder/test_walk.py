@@ -251,6 +251,38 @@ def test_several_robots_are_sums_of_each(walked: Analysis) -> None:
         assert figure.shows(value), (figure, value)
 
 
+def test_of_a_route_a_cycle_is_that_of_a_part(
+    walked: Analysis, tended: Callable[[Analysis], Analysis]
+) -> None:
+    """What a part costs was what the whole run had cost, however many it had made."""
+    whole = replace(walked, recording=replace(walked.recording, facts=()))
+    whole = replace(whole, program=replace(whole.program, unshortened=None))
+    made = tended(whole)
+    assert made.tending is not None
+    assert made.program is not None
+    cycle = production_of(made)
+    assert cycle is not None
+    assert cycle.energy == pytest.approx(sum(part.joules for part in made.tending.parts) / 2.0)
+    assert sum(share.energy for share in cycle.modes.values()) == pytest.approx(cycle.energy)
+    costs = costs_of(2)
+    found = READ.figures_of(report_html(made, findings(made), costs=costs))
+    rows = {f"{part.number}": part for part in made.tending.parts}
+    for name, part in rows.items():
+        for head, exact in (("energy", part.joules), ("predicted", part.planned_joules)):
+            shown = READ.called(found, f"{name}: {head}")
+            assert any(figure.shows(exact) for figure in shown), (shown, exact)
+    _, year = cycles_of(cycle.seconds, costs)
+    figures = READ.called(found, f"{cycle.name}: a cycle", f"{cycle.name}: a part")
+    assert figures
+    for figure in figures:
+        price = cycle.energy * costs.production_price / 3.6e6
+        assert figure.shows({"J": cycle.energy, "EUR": price, "s": cycle.seconds}[figure.kind])
+    exact = cycle.energy * year * costs.production_price / 3.6e6
+    yearly = [f for f in READ.called(found, "a year of such cycles") if f.kind == "EUR"]
+    assert yearly
+    assert all(figure.shows(exact) for figure in yearly)
+
+
 def test_the_terminal_says_what_the_pages_show(walked: Analysis) -> None:
     cycle = production_of(walked)
     program = walked.program

@@ -194,7 +194,7 @@ def _ended(analysis: Analysis) -> str:
 
 
 def _driven(analysis: Analysis, program: ProgramTotals) -> Production | None:
-    """The mean cycle of what was driven."""
+    """The mean cycle of what was driven; of a route that is the cycle of a part."""
     steps = analysis.steps
     ended = sum(result.step.outcome == ENDED for result in steps)
     cycles = ended / max(steps[0].step.total, 1)
@@ -208,6 +208,10 @@ def _driven(analysis: Analysis, program: ProgramTotals) -> Production | None:
             f"{cycles % 1.0:.2f} of one"
         )
     name = "this run" if cycles == 1.0 else f"mean of {cycles:.3g} cycles of this run"
+    if analysis.tending is not None:
+        cycles *= len(analysis.tending.parts)
+        filled = ", filling the line included" if analysis.tending.filling else ""
+        name = f"mean of {cycles:.3g} parts of this run{filled}"
     full = program.unshortened
     if full is not None and math.isnan(full.energy):
         notes.append("the pauses of the run are shortened: its year is one of such cycles")

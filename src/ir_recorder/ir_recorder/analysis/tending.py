@@ -15,7 +15,7 @@ from ir_description import Cell
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.report import PlannedMovement
 
-_SHORT = 0.05  # s: what nodes take to answer isn't a wait for a machine
+SHORT = 0.05  # s: what nodes take to answer isn't a wait for a machine
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +144,7 @@ def _row(
             paused[name] = paused.get(name, 0.0) + step.end - step.start
         names = [Signal.parse(text).name for text in movement.wait_for]
         for name in dict.fromkeys(answers[each] for each in names if each in answers):
-            if step.start - step.begin > _SHORT:
+            if step.start - step.begin > SHORT:
                 late[name] = late.get(name, 0.0) + step.start - step.begin
     finished = {
         machine.name: sum(each.within(span.begin, span.end) for each in machine.finished)

@@ -30,6 +30,7 @@ from ir_recorder.report.costs import (
     share_between,
     yearly_money,
 )
+from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import (
     DASH,
     interval,
@@ -152,7 +153,8 @@ def tiles(analysis: Analysis, costs: Costs | None = None) -> str:
     """A year, the cycle and its peak; those of the program where one was executed."""
     program = analysis.program
     prices = costs or Costs()
-    paid = (_yearly(analysis, prices), _saved(analysis))
+    alone = [] if _held_against(analysis) else _paid(analysis, prices).tiles(prices)
+    paid = (*alone, _yearly(analysis, prices), _saved(analysis))
     if analysis.recording.only_planned and program is None:
         return _html([*paid, *_planned(analysis)])
     if program is None:
@@ -172,25 +174,35 @@ def _peak(analysis: Analysis) -> Tile:
     return Tile("peak power", watts(analysis.peak_power), ("of a 10 ms reading",))
 
 
+def _held_against(analysis: Analysis) -> bool:
+    """Whether a year of the common program is known, beside which what is saved stands."""
+    cycle = production_of(analysis)
+    return cycle is not None and cycle.savings is not None
+
+
 def paid_row(analysis: Analysis, costs: Costs) -> str:
-    """What those who pay ask first, as on every page; "" where nothing of it is known."""
+    """What those who pay ask first, as on every page; "" without a common program, where it stands
+    among the figures of the run.
+    """
+    return _paid(analysis, costs).html(costs) if _held_against(analysis) else ""
+
+
+def _paid(analysis: Analysis, costs: Costs) -> Paid:
     cycle = production_of(analysis)
     idle = idle_saving(idle_watts(analysis), costs) if cycle is not None else None
     saved = costs.saving_of_year(cycle) if cycle is not None else None
     if cycle is None or cycle.savings is None or saved is None:
-        return Paid(None, 0.0, idle, None).html(costs)
+        return Paid(None, 0.0, idle, None)
     total = cycle.savings.total
     pace = total.seconds or cycle.seconds
     common = total.common * costs.cycles_per_year(pace)
-    counted = f", {cycles_of_year(pace, costs)}"
+    said = f", {cycles_of_year(pace, costs)}"
     driven = None
     if analysis.program is not None:
         name = f"as driven, {analysis.recording.origin}"
         driven = (name, costs.energy_of_year(cycle).value)
     line = of_recording(analysis, costs)
-    return Paid(saved, common, idle, line, counted, "common program", driven, cycle.supply).html(
-        costs
-    )
+    return Paid(saved, common, idle, line, said, "common program", driven, cycle.supply)
 
 
 def run_tiles(analysis: Analysis) -> str:
@@ -251,6 +263,8 @@ def _whole(
     _, planned = driven_and_predicted(analysis)
     whole_cycle = production_of(analysis) is not None or not math.isfinite(whole.energy)
     name = "program, one cycle" if whole_cycle else "program, not driven to its end"
+    if analysis.tending is not None and whole_cycle:
+        name = f"program, {counted(len(analysis.tending.parts), 'part')}"
     return Tile(
         "this run, pauses shortened" if shortened else name,
         show(whole.energy),

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ir_recorder.analysis import Analysis
-from ir_recorder.analysis.tending import PartRow, Span, Tending
+from ir_recorder.analysis.tending import SHORT, PartRow, Span, Tending
 from ir_recorder.reading.recording import PowerSeries
 from ir_recorder.report.gantt import Bar, Gantt, legend, mode_bars
 from ir_recorder.report.number_text import DASH, seconds, text, watt_hours
@@ -84,7 +84,7 @@ def _robot(part: PartRow, tending: Tending) -> list[Bar]:
     carrying = False
     for step in tending.steps:
         movement = step.movement
-        if step.start > step.begin:
+        if step.start - step.begin > SHORT:
             bars.append(("late", Span(step.begin, step.start), "waits for a signal"))
         if not movement.since:
             style = "loaded" if carrying else "empty"

@@ -288,8 +288,10 @@ def _tiles(found: Sequence[Figures]) -> str:
 
 
 def _against(own: Sequence[Run], place: str, settings: ArenaSettings) -> Iterator[str]:
+    """Who solved more than the portfolio, and all whose J is lower in one sentence."""
     found = {planner: figures(planner, own) for planner in settings.planners}
     mine = found[PORTFOLIO]
+    lower = []
     for planner, other in found.items():
         if other.success > mine.success:
             yield (
@@ -298,11 +300,13 @@ def _against(own: Sequence[Run], place: str, settings: ArenaSettings) -> Iterato
             )
         against = compared(PORTFOLIO, planner, own, _TIE)
         if against.ratio < 1.0 - _TIE:
-            less = f"{100.0 * (1.0 - against.ratio):.2f} % below the portfolio's"
-            yield (
-                f"{place}: J of {planner} is {less} in the median of the {against.both} runs "
-                f"that both solved; it is lower in {against.lower} of them."
-            )
+            less = f"{100.0 * (1.0 - against.ratio):.2f} %"
+            lower.append(f"{planner} {less} (lower in {against.lower} of {against.both})")
+    if lower:
+        yield (
+            f"{place}: J below the portfolio's, in the median of the runs that both solved: "
+            f"{', '.join(lower)}."
+        )
 
 
 def _cell_section(
@@ -324,11 +328,11 @@ def _cell_section(
     )
     if drawn:
         drawn = f'<div><h3>Time against energy</h3><p class="hint">{_FRONT_HINT}</p>{drawn}</div>'
-    parts.insert(0, f'<h2>{text(title)}</h2><div class="seen">{picture}{drawn}</div>')
+    parts.insert(0, f'<div class="seen">{picture}{drawn}</div>')
     key = f"{list(titles).index(name) + 1}_{re.sub(r'[^a-z0-9]+', '_', title.lower())}"
-    return f"<section>{''.join(parts)}</section>".replace(
-        'id="energy_over_cycle_time"', f'id="energy_{key}"'
-    )
+    shown = "".join(parts).replace('id="energy_over_cycle_time"', f'id="energy_{key}"')
+    head = f"<summary><h2>{text(title)}</h2></summary>"
+    return f'<details class="part paper">{head}{shown}</details>'
 
 
 _FRONT_HINT = (

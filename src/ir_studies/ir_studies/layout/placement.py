@@ -303,7 +303,7 @@ class Condition:
     @property
     def text(self) -> str:
         """In words."""
-        cycle = f"{shortest(self.cycle_time)} s" if self.cycle_time else "free"
+        cycle = f"{shortest(self.cycle_time)} s" if self.cycle_time else "no cycle time"
         return " ".join([cycle, *(f"{name} {shortest(mass)} kg" for name, mass in self.payload)])
 
 
