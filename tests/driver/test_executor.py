@@ -4,6 +4,8 @@ limits.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -286,6 +288,25 @@ def test_an_unreached_goal_tolerance_ends_after_the_goal_time(
     outcome = run_out(simulation)
     assert outcome.code == ErrorCode.GOAL_TOLERANCE_VIOLATED
     assert simulation.time == pytest.approx(2.3, abs=0.01)
+
+
+def test_tolerances_and_a_goal_time_of_0_are_the_settings(make, plan, start, run_out, home, there):
+    zero = [JointTolerance(f"joint_a{i}", position=0.0) for i in range(1, 7)]
+    tight = make("pybullet", execution=ExecutionSettings(tube=0.1, path_tolerance=1e-5))
+    start(tight, plan(2.0, home, there), path_tolerance=zero)
+    tight.run(0.5)
+    tight.disturb(np.array([0.0, 0.0, 900.0, 0.0, 0.0, 0.0]))
+    assert run_out(tight).code == ErrorCode.PATH_TOLERANCE_VIOLATED
+    usual = make("pybullet")
+    start(usual, plan(2.0, home, there), goal_tolerance=zero)
+    assert run_out(usual).code == ErrorCode.SUCCESSFUL
+    unreached = make("pybullet", execution=ExecutionSettings(goal_time=0.3))
+    finest = [replace(one, position=1e-9) for one in zero]  # finer than encoders
+    start(unreached, plan(2.0, home, there), goal_tolerance=finest, goal_time=0.0)
+    unreached.run(1.9)
+    unreached.disturb(np.array([300.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    assert run_out(unreached).code == ErrorCode.GOAL_TOLERANCE_VIOLATED
+    assert unreached.time == pytest.approx(2.3, abs=0.01)
 
 
 def test_a_stamp_in_the_near_future_waits(make, plan, start, home, there):
