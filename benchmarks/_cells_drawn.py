@@ -6,15 +6,15 @@ import numpy as np
 
 from ir_studies.cells.instance import (
     Conflict,
+    DynamicActivity,
     EnergyCurve,
     Handover,
-    Hop,
+    HopMovement,
     Instance,
-    Lag,
-    Movement,
-    Place,
-    Robot,
-    Stop,
+    InstanceRobot,
+    StaticActivity,
+    StopLocation,
+    TimeLag,
 )
 
 _DIGITS = 6
@@ -31,21 +31,21 @@ class _Draw:
         self.modes = {k: [0.0, 3.0, 8.0][k] for k in range(int(rng.integers(1, 4)))}
         first = index * _PER_ROBOT
         self.stops = [self._stop(first + k, last=k == stops - 1) for k in range(stops)]
-        self.hops: list[Hop] = []
+        self.hops: list[DynamicActivity] = []
         self.intervals: dict[int, tuple[float, float, int]] = {}  # start, end, choice
         self._free_order(first + stops)
 
     def _number(self, low: float, high: float) -> float:
         return round(float(self.rng.uniform(low, high)), _DIGITS)
 
-    def _stop(self, number: int, *, last: bool) -> Stop:
+    def _stop(self, number: int, *, last: bool) -> StaticActivity:
         places = []
         for k in range(1 if last else int(self.rng.integers(1, 4))):
             watts = self._number(50.0, 100.0)
             power = {mode: round(watts * 0.5**mode, _DIGITS) for mode in self.modes}
-            places.append(Place(k, number * 10 + k, power))
+            places.append(StopLocation(k, number * 10 + k, power))
         least = self._number(0.2, 3.0)
-        return Stop(
+        return StaticActivity(
             number, least, round(least + self._number(20.0, 40.0), _DIGITS), tuple(places), last
         )
 
@@ -68,9 +68,9 @@ class _Draw:
                         for p, span in ((-1, (150.0, 400.0)), (0, (10.0, 60.0)), (1, (40.0, 90.0)))
                     )
                     curve = EnergyCurve(terms, least, most)
-                    moves.append(Movement(len(moves), one.point, other.point, curve))
+                    moves.append(HopMovement(len(moves), one.point, other.point, curve))
             ends = (self.stops[a].number, self.stops[b].number)
-            self.hops.append(Hop(number + k, *ends, tuple(moves)))
+            self.hops.append(DynamicActivity(number + k, *ends, tuple(moves)))
 
     def hidden(self) -> float:
         """Go through the stops in order with random choices; the time that it takes."""
@@ -109,7 +109,7 @@ def drawn(robots: int, stops: int, seed: int, conflicts: int = 12) -> Instance:
         start, end, choice = draw.intervals[closing]
         draw.intervals[closing] = (start, end + cycle - total, choice)
         stop = draw.stops[-1]
-        draw.stops[-1] = Stop(stop.number, stop.least, cycle, stop.places, closes=True)
+        draw.stops[-1] = StaticActivity(stop.number, stop.least, cycle, stop.places, closes=True)
     lags = []
     handovers = []
     for k in range(robots - 1):
@@ -118,9 +118,9 @@ def drawn(robots: int, stops: int, seed: int, conflicts: int = 12) -> Instance:
         begin = phases[k] + draws[k].intervals[giver.number][0]
         taken = phases[k + 1] + draws[k + 1].intervals[taker.number][0]
         height = int(np.ceil((begin - taken) / cycle))
-        lags.append(Lag(giver.number, taker.number, 0.0, height))
+        lags.append(TimeLag(giver.number, taker.number, 0.0, height))
         back = int(np.ceil((taken - begin) / cycle)) + 1
-        lags.append(Lag(taker.number, giver.number, 0.0, back))
+        lags.append(TimeLag(taker.number, giver.number, 0.0, back))
         hidden = (
             draws[k].intervals[giver.number][2],
             draws[k + 1].intervals[taker.number][2],
@@ -130,7 +130,9 @@ def drawn(robots: int, stops: int, seed: int, conflicts: int = 12) -> Instance:
         ]
         handovers.append(Handover((giver.number, taker.number), frozenset([hidden, *others])))
     chosen = _exclusions(draws, phases, cycle, conflicts, rng) if robots > 1 else []
-    made = tuple(Robot(f"robot {d.index}", tuple(d.stops), tuple(d.hops), d.modes) for d in draws)
+    made = tuple(
+        InstanceRobot(f"robot {d.index}", tuple(d.stops), tuple(d.hops), d.modes) for d in draws
+    )
     name = f"drawn_{robots}_{stops}_{seed}"
     return Instance(name, cycle, made, tuple(lags), tuple(handovers), tuple(chosen))
 

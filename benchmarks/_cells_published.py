@@ -11,7 +11,7 @@ import numpy as np
 
 from ir_planner.cycle import LinearAnswer, LinearProgram
 from ir_studies.cells import Instance
-from ir_studies.cells.instance import Hop, Movement, Robot
+from ir_studies.cells.instance import DynamicActivity, HopMovement, InstanceRobot
 from ir_studies.cells.solution import after
 
 _SEGMENTS = 10
@@ -43,7 +43,7 @@ class PublishedModel:
         """Least energy by the segments."""
         return self.program.solve(stopped=after(seconds), gap=1e-6)
 
-    def _stays(self, robot: Robot) -> None:
+    def _stays(self, robot: InstanceRobot) -> None:
         p = self.program
         for stop in robot.stops:
             v = stop.number
@@ -62,7 +62,7 @@ class PublishedModel:
             p.row(dict.fromkeys(modes.values(), 1.0), low=1.0, high=1.0)
             p.row({self.place[v, q.number]: 1.0 for q in stop.places}, low=1.0, high=1.0)
 
-    def _hops(self, robot: Robot) -> None:
+    def _hops(self, robot: InstanceRobot) -> None:
         for hop in robot.hops:
             for movement in hop.movements:
                 self.move[hop.number, movement.number] = self.program.binary()
@@ -79,7 +79,7 @@ class PublishedModel:
                     here = self.place[stop.number, place.number]
                     self.program.row(terms | {here: -1.0}, low=0.0, high=0.0)
 
-    def _movement(self, hop: Hop, movement: Movement) -> None:
+    def _movement(self, hop: DynamicActivity, movement: HopMovement) -> None:
         p = self.program
         e = hop.number
         on = self.move[e, movement.number]
@@ -95,7 +95,7 @@ class PublishedModel:
         p.row({self.duration[e]: 1.0, on: -curve.least}, low=0.0)
         p.row({self.duration[e]: 1.0, on: cycle}, high=curve.most + cycle)
 
-    def _order(self, robot: Robot) -> None:
+    def _order(self, robot: InstanceRobot) -> None:
         p = self.program
         cycle = self.instance.cycle
         closing = robot.closing.number

@@ -17,7 +17,7 @@ from _program_chains import Chains
 
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Goal, Planner
-from ir_planner.program.stops import Node
+from ir_planner.program.stops import StopNode
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def common_program(chains: Chains, planner: Planner, options: PlanOptions) -> Co
     return CommonProgram(T, E, not_free / max(segments, 1))
 
 
-def _nearest(chains: Chains) -> list[Node]:
+def _nearest(chains: Chains) -> list[StopNode]:
     """One node per stop: the nearest by W to the one before, turns included."""
     weights = chains.route.arriving(0).weights
     nodes = [chains.layers[0][0]]

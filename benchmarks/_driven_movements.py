@@ -14,7 +14,7 @@ from _cell_movements import CellMovement, movements_of, planner_in
 from ir_description import Cell
 from ir_planner import PlannerSettings
 from ir_sim_driver import Simulation, TrajectoryGoal, make_simulation
-from ir_sim_driver.motion import Outcome
+from ir_sim_driver.motion import GoalOutcome
 from ir_sim_driver.plant import Plant, carried
 
 REST = 0.5  # s in which the loops settle
@@ -50,7 +50,7 @@ class Driven:
     def __init__(self, cell: Cell, plant: str | Plant) -> None:
         self.simulation: Simulation = make_simulation(cell, plant=plant)
 
-    def drive(self, movement: CellMovement) -> Outcome:
+    def drive(self, movement: CellMovement) -> GoalOutcome:
         """Put the robot at the begin of the movement, let it settle, and drive."""
         simulation = self.simulation
         if simulation.stopped:

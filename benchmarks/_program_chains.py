@@ -20,7 +20,7 @@ from ir_msgs_py.report import TrajectoryReport
 from ir_planner import Goal, Planner, TimingError
 from ir_planner.program.chain import layers_of
 from ir_planner.program.steps import Route, Scenes, placed_steps, steps_of
-from ir_planner.program.stops import Node
+from ir_planner.program.stops import StopNode
 from ir_planner.request import Context, Journal, Work
 from ir_planner.scene import PlanningScene
 from ir_planner.service import exit_searches, timed_service
@@ -108,7 +108,7 @@ class Chains:
     planner: Planner
     route: Route
     options: PlanOptions
-    layers: list[list[Node]]
+    layers: list[list[StopNode]]
     known: EdgeCosts
     costs: list[FloatArray] = field(default_factory=list)
     planned: list[BoolArray] = field(default_factory=list)
@@ -223,14 +223,14 @@ class Chains:
         self.costs[place][a, b] += found - bound
         self.planned[place][a, b] = True
 
-    def _bound(self, place: int, first: Node, second: Node) -> float:
+    def _bound(self, place: int, first: StopNode, second: StopNode) -> float:
         scene = self.route.arriving(place)
         goals = second.arrival[None]
         if self.options.objective == "movement_cost":
             return float(least_travel(scene, first.departure, goals)[0])
         return float(least_cost(scene, first.departure, goals, self.options.time_value)[0])
 
-    def _across(self, place: int, first: Node, second: Node) -> float:
+    def _across(self, place: int, first: StopNode, second: StopNode) -> float:
         """Cost of the regional movement that the planner answers with; inf: none."""
         key = (first.departure.tobytes(), second.arrival.tobytes(), self._asked())
         if key not in self.known:
@@ -244,7 +244,7 @@ class Chains:
             self.edges += 1
         return self.known[key]
 
-    def _lines(self, place: int, node: Node, *, entry: bool) -> float:
+    def _lines(self, place: int, node: StopNode, *, entry: bool) -> float:
         """Cost of a service line into the stop of a place or out of the one before it; inf: not
         possible.
         """
@@ -256,7 +256,7 @@ class Chains:
             self.known[key] = np.inf if report is None else cost_of(report, self.options)
         return self.known[key]
 
-    def line(self, place: int, node: Node, *, entry: bool) -> TrajectoryReport | None:
+    def line(self, place: int, node: StopNode, *, entry: bool) -> TrajectoryReport | None:
         """The service line into the stop of a place or out of the one before it; None: none, or not
         free.
         """

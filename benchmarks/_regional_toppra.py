@@ -22,7 +22,7 @@ from toppra.algorithm import TOPPRA
 from toppra.constraint import LinearConstraint
 from toppra.constraint.linear_constraint import canlinear_colloc_to_interpolate
 
-from ir_msgs_py.trajectory import Samples
+from ir_msgs_py.trajectory import MotionSamples
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_values.arrays import FloatArray
 
@@ -144,7 +144,7 @@ class PathTrajectory:
         """No polynomials: whoever asks for them samples."""
         return np.zeros((0, self._legs[0].path.dof, 6)), np.zeros(0)
 
-    def sample(self, t: FloatArray) -> Samples:
+    def sample(self, t: FloatArray) -> MotionSamples:
         """Motion at t (M,) [s]."""
         quick = np.asarray(t) / self._factor
         which = np.clip(
@@ -168,7 +168,7 @@ class PathTrajectory:
             q[mine] = leg.path(s)
             qd[mine] = ps * sd[:, None] / self._factor
             qdd[mine] = (pss * sd[:, None] ** 2 + ps * u[:, None]) / self._factor**2
-        return Samples(q, qd, qdd, np.zeros_like(q))
+        return MotionSamples(q, qd, qdd, np.zeros_like(q))
 
 
 def _excess(trajectory: PathTrajectory, scene: PlanningScene) -> float:

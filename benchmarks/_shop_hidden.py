@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from _results import Claim, at_least, at_most
 
-from ir_krl import Effect, KrlError, Motion, SetOutput, Wait, follow, parse
+from ir_krl import Effect, KrlError, Motion, SetOutput, StandStill, follow, parse
 from ir_values.arrays import FloatArray
 
 PROGRAMS = 300
@@ -309,7 +309,7 @@ def found_in(hidden: Hidden) -> tuple[list[Truth], bool]:
     for command in program.commands:
         if isinstance(command, Motion):
             found.append(_motion(command))
-        elif isinstance(command, Wait):
+        elif isinstance(command, StandStill):
             found.append(("wait", command.seconds))
         elif isinstance(command, SetOutput):
             found.append(("out", command.number, command.value))

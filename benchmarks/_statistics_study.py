@@ -22,7 +22,7 @@ from ir_recorder.analysis.intervals import alike, mean_of
 from ir_studies import Means, study_of
 from ir_studies.statistics import EXAMPLE, StatisticsSettings, run_statistics
 from ir_studies.statistics.findings import Comparison
-from ir_studies.statistics.runs import Finished
+from ir_studies.statistics.runs import FinishedStatistics
 from ir_studies.statistics.settings import DRAWN
 from ir_studies.work.results import NAME
 from ir_values.arrays import FloatArray
@@ -70,7 +70,7 @@ def statistics_claims(parts: Collection[str], out: Path | None, *, quick: bool) 
     return claims
 
 
-def made(settings: StatisticsSettings, folder: Path) -> Finished:
+def made(settings: StatisticsSettings, folder: Path) -> FinishedStatistics:
     """Run a study and print what it says."""
     finished = run_statistics(settings, folder, Means())
     print(
@@ -80,7 +80,7 @@ def made(settings: StatisticsSettings, folder: Path) -> Finished:
     return finished
 
 
-def recomputed(finished: Finished, folder: Path) -> list[Claim]:
+def recomputed(finished: FinishedStatistics, folder: Path) -> list[Claim]:
     """Figures of the study against those computed here from the lines of its results."""
     rows = [json.loads(line) for line in (folder / NAME).read_text().splitlines()]
     rows = sorted((row for row in rows if "key" in row), key=lambda row: int(row["key"]))
@@ -161,14 +161,14 @@ def t_quantile(level: float, freedom: int) -> float:
     return float(brentq(missing, 0.0, 100.0, xtol=1e-12))
 
 
-def held(finished: Finished) -> list[Claim]:
+def held(finished: FinishedStatistics) -> list[Claim]:
     """How many movements of robots drawn for each pair lie in the predicted interval."""
     share = 100.0 * finished.findings.covered
     name = f"statistics: {finished.findings.driven} movements within the predicted 90 % interval"
     return [at_least(f"{name}, each pair with a robot of its own", share, "%", HELD)]
 
 
-def never_slower(finished: Finished) -> list[Claim]:
+def never_slower(finished: FinishedStatistics) -> list[Claim]:
     """Law 4."""
     slower = finished.findings.slower
     return [
@@ -176,7 +176,7 @@ def never_slower(finished: Finished) -> list[Claim]:
     ]
 
 
-def resampled(finished: Finished) -> None:
+def resampled(finished: FinishedStatistics) -> None:
     """How often the interval of the mean holds where pairs are drawn from the differences of a
     study.
     """

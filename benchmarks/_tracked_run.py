@@ -21,7 +21,7 @@ from ir_msgs_py.modes import Mode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.measure import Samples, samples_of
 from ir_recorder.traces import Trace
-from ir_sim_driver.plant import BasePower, Plant, PowerMeter, Work
+from ir_sim_driver.plant import BasePower, MotorWork, Plant, PowerMeter
 from ir_values.arrays import FloatArray
 
 DT = 0.002  # s
@@ -93,7 +93,7 @@ class TrackedRun:
         torque = self._torques(stretch)
         base, tool = self._standing(stretch)
         meter.add(base, tool, True, len(torque))
-        meter.settle(Work(stretch.qd, torque))
+        meter.settle(MotorWork(stretch.qd, torque))
         return meter.reading().energy
 
     def metered(self, start: float, end: float) -> float:
@@ -138,7 +138,7 @@ class TrackedRun:
             rows = slice(first, min(first + READING, count))
             steps = rows.stop - rows.start
             self._meter.add(base, tool, on, steps)
-            self._meter.settle(Work(stretch.qd[rows], torque[rows]))
+            self._meter.settle(MotorWork(stretch.qd[rows], torque[rows]))
             self._steps += steps
             self._readings.append((self.time, self._meter.reading().energy, stretch.mode.name))
         seen = stretch.q[::ENCODER]

@@ -22,7 +22,7 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver import make_simulation
 from ir_sim_driver.controller import Simulation
 from ir_sim_driver.errors import TrajectoryRefusedError
-from ir_sim_driver.motion import ErrorCode, Outcome, TrajectoryGoal
+from ir_sim_driver.motion import ErrorCode, GoalOutcome, TrajectoryGoal
 from ir_values.arrays import FloatArray
 
 TITLE = "contact with machines, floor and parts"
@@ -211,7 +211,9 @@ def _goal(
     return None
 
 
-def _driven(simulation: Simulation, goal: TrajectoryGoal) -> tuple[Outcome, list[FloatArray], int]:
+def _driven(
+    simulation: Simulation, goal: TrajectoryGoal
+) -> tuple[GoalOutcome, list[FloatArray], int]:
     """The outcome, positions after every step, and the step after which the robot was stopped."""
     simulation.execute(simulation.vet(goal, 0), 0)
     positions: list[FloatArray] = []

@@ -14,8 +14,8 @@ import numpy as np
 from ir_recorder import Analysis
 from ir_recorder.analysis.results import mode_name
 from ir_recorder.live import LiveServer, Stream
-from ir_recorder.live.cell_view import CellView, Heard
-from ir_recorder.live.server import Answer
+from ir_recorder.live.cell_view import CellView, ReceivedCell
+from ir_recorder.live.server import ButtonAnswer
 from ir_recorder.reading.recording import BitSeries
 
 RATE = 20.0  # Hz, as the node
@@ -31,7 +31,7 @@ def live_view(analysis: Analysis, until: float) -> Iterator[LiveServer]:
     for t in np.arange(max(until - WINDOW, 0.0), until, 1.0 / RATE):
         now[0] = float(t)
         stream.add(_heard_at(analysis, view, now[0]), always=("w",))
-    server = LiveServer(stream, lambda name, value: Answer(False, ""), lambda: view.scene)
+    server = LiveServer(stream, lambda name, value: ButtonAnswer(False, ""), lambda: view.scene)
     ended = Event()
 
     def beat() -> None:
@@ -62,7 +62,7 @@ def _heard_at(analysis: Analysis, view: CellView, t: float) -> dict[str, Any]:
     movement = step.movement if step is not None else None
     load = next((name for time, name in reversed(analysis.loads.observations) if time <= t), "none")
     q = joints.position[np.searchsorted(joints.time, t)]
-    heard = Heard(
+    heard = ReceivedCell(
         recording.cell_yaml,
         joints=cell.robot.joint_names,
         q=q,

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ir_cli.ros.plan_recording import ProgramRequest, write_plan
+from ir_cli.ros.plan_recording import RecordedRequest, write_plan
 from ir_planner import Planner
 from ir_planner.before_after import before_after_common
 from ir_recorder import analyse, findings, read_recording
@@ -23,7 +23,7 @@ def test_comparison_and_report_of_a_plan_show_one_saving(planner: Planner, tmp_p
     start = planner.cell.machine_home
     compared = before_after_common(planner, STATIONS, start)
     plan = planner.plan_program(stations=STATIONS, start=start, savings=True)
-    request = ProgramRequest(STATIONS, savings=True)
+    request = RecordedRequest(STATIONS, savings=True)
     file = write_plan(tmp_path / "plan.mcap", plan, request, planner)
     analysis = analyse(read_recording(file))
     cycle = production_of(analysis)

@@ -21,7 +21,7 @@ from ir_cli.view.background import Inbox
 from ir_cli.view.cell_file import STILL, Recorded, Watched
 from ir_cli.view.clearance import names_in
 from ir_cli.view.playback import motion_of
-from ir_cli.view.session import Session, Stage
+from ir_cli.view.session import Session, ShownCell
 from ir_description import load_cell
 from ir_planner import Planner
 from ir_recorder.report.data import side_content
@@ -70,7 +70,7 @@ class View:
         self.browser = FakeBrowser(self.port, self.token)
 
     @property
-    def stage(self) -> Stage:
+    def stage(self) -> ShownCell:
         assert self.session._stage is not None
         return self.session._stage
 

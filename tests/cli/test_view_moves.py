@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from ir_cli.commands import BY_PATH, renamed
 from ir_cli.view.cell_file import SavingError, Watched, save
-from ir_cli.view.moves import Target, cell_with, edited, meant, pose_in, snippet, targets
+from ir_cli.view.moves import DragTarget, cell_with, edited, meant, pose_in, snippet, targets
 from ir_description import Cell, cell_from_yaml, cell_to_yaml, load_cell
 from ir_description.poses import pose_of, rotation_from_abc
 
@@ -57,7 +57,7 @@ def without_poses(text: str) -> list[str]:
 
 
 def dragged(
-    cell: Cell, target: Target, xyz: tuple[float, ...], abc: tuple[float, ...] | None
+    cell: Cell, target: DragTarget, xyz: tuple[float, ...], abc: tuple[float, ...] | None
 ) -> np.ndarray:
     before = pose_in(cell, target)
     return meant(pose_of(xyz, before[:3, :3] if abc is None else rotation_from_abc(abc)), before)
@@ -80,7 +80,7 @@ def test_the_file_reads_back_as_the_cell_that_was_shown(data: st.DataObject) -> 
 
 def test_what_did_not_move_is_not_written_again() -> None:
     cell = cell_from_yaml(LAYOUTS)
-    moves = {Target("equipment", "block"): pose_of((1.5, 0.2, 0.0))}
+    moves = {DragTarget("equipment", "block"): pose_of((1.5, 0.2, 0.0))}
     assert edited(LAYOUTS, cell, moves) == LAYOUTS.replace("- 0   # beside", "- 0.2   # beside")
     assert snippet(moves) == "# machine block\npose: {xyz: [1.5, 0.2, 0]}"
 
@@ -95,7 +95,7 @@ def test_nothing_is_overwritten_and_a_changed_file_is_not_mixed(tmp_path: Path) 
     path = tmp_path / "c.yaml"
     path.write_text(LAYOUTS, encoding="utf-8")
     cell = load_cell(path)
-    moves = {Target("station", "a"): pose_of((0.1, 0.0, 0.0))}
+    moves = {DragTarget("station", "a"): pose_of((0.1, 0.0, 0.0))}
     assert [save(Watched(str(path)), cell, moves).name for _ in range(2)] == [
         "c_moved.yaml",
         "c_moved_2.yaml",

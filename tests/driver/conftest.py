@@ -12,7 +12,7 @@ from ir_description import Cell, load_cell
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.controller.simulation import Simulation, make_simulation
-from ir_sim_driver.motion.goal import Outcome, TrajectoryGoal
+from ir_sim_driver.motion.goal import GoalOutcome, TrajectoryGoal
 
 
 @pytest.fixture(scope="session")
@@ -63,10 +63,10 @@ def start() -> Callable[..., int]:
 
 
 @pytest.fixture(scope="session")
-def run_out() -> Callable[..., Outcome]:
+def run_out() -> Callable[..., GoalOutcome]:
     """Step until the goal has ended; returns its outcome."""
 
-    def run(simulation: Simulation, limit: float = 60.0) -> Outcome:
+    def run(simulation: Simulation, limit: float = 60.0) -> GoalOutcome:
         for _ in range(round(limit / simulation.settings.dt)):
             simulation.step()
             outcomes = simulation.take_outcomes()

@@ -10,7 +10,7 @@ import pytest
 from ir_description import OUTSIDE_MAX
 from ir_kernels.dynamics import DynamicsModel
 from ir_sim_driver.errors import TrajectoryRefusedError
-from ir_sim_driver.motion import ExecutionSettings, Motion, check_trajectory, checked_route
+from ir_sim_driver.motion import ExecutionSettings, PathMotion, check_trajectory, checked_route
 
 SETTINGS = ExecutionSettings()
 
@@ -21,7 +21,7 @@ def dynamics(cell):
 
 
 def still(q):
-    return Motion(q, np.zeros(6), np.zeros(6))
+    return PathMotion(q, np.zeros(6), np.zeros(6))
 
 
 def drawn(cell, seed):

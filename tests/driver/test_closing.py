@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from ir_sim_driver.controller.simulation import make_simulation
 from ir_sim_driver.errors import TrajectoryRefusedError
-from ir_sim_driver.motion import ExecutionSettings, Motion, check_trajectory, checked_route
+from ir_sim_driver.motion import ExecutionSettings, PathMotion, check_trajectory, checked_route
 
 SETTINGS = ExecutionSettings()
 SIGNS = [[1.0 if k >> j & 1 else -1.0 for j in range(6)] for k in range(64)]
@@ -24,7 +24,7 @@ def loaded():
 
 
 def still(q):
-    return Motion(q, np.zeros(6), np.zeros(6))
+    return PathMotion(q, np.zeros(6), np.zeros(6))
 
 
 def on(simulation, plan, q, stands):

@@ -17,7 +17,7 @@ from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import (
     ErrorCode,
     ExecutionSettings,
-    Motion,
+    PathMotion,
     check_trajectory,
     checked_route,
 )
@@ -53,7 +53,7 @@ def weak(bare, share, friction=0.0):
 
 
 def still(q):
-    return Motion(q, np.zeros(6), np.zeros(6))
+    return PathMotion(q, np.zeros(6), np.zeros(6))
 
 
 def turned(joint, by=0.1):
@@ -130,7 +130,7 @@ def test_every_kind_of_lead_in_keeps_the_torques_by_a_second_opinion(bare, plan,
     for _ in range(20):
         q = low + rng.random(6) * (high - low)
         there = q + rng.uniform(-0.5, 0.5, 6)
-        moving = Motion(q, 0.02 * rng.normal(size=6), 0.02 * rng.normal(size=6))
+        moving = PathMotion(q, 0.02 * rng.normal(size=6), 0.02 * rng.normal(size=6))
         cases = {
             "closing": (plan(4.0, q, there), still(q + 0.0099 * rng.uniform(-1.0, 1.0, 6))),
             "leading": (plan([rng.uniform(0.3, 2.0), 5.0], there, q), moving),

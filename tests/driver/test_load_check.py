@@ -12,9 +12,9 @@ from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver import (
     ErrorCode,
+    GoalOutcome,
     LoadCheckSettings,
     LoadFinding,
-    Outcome,
     SimulationSettings,
     TrajectoryGoal,
     make_simulation,
@@ -28,7 +28,9 @@ from ir_values.arrays import FloatArray
 CELL = load_cell("demo")
 
 
-def driven(mass_error: float, load: str = "cell", backend: str = "ideal") -> tuple[Outcome, Level]:
+def driven(
+    mass_error: float, load: str = "cell", backend: str = "ideal"
+) -> tuple[GoalOutcome, Level]:
     """A movement of A2 with a load that is so much heavier than declared, and the executor's level
     after.
     """

@@ -9,7 +9,7 @@ from ir_description import load_power_data
 from ir_kernels.power import DcBusParameters, dc_bus
 from ir_msgs_py.modes import Mode
 from ir_sim_driver.plant import BasePower, PowerMeter, nominal_plant
-from ir_sim_driver.plant.backend import Work
+from ir_sim_driver.plant.backend import MotorWork
 
 DT = 0.001
 HOME = np.zeros(6)
@@ -41,9 +41,9 @@ def test_batches_of_any_length_read_the_same(meter, cell):
     other = PowerMeter(nominal_plant(cell.robot, load_power_data()), DT)
     for k in range(200):
         meter.add(300.0)
-        meter.settle(Work(speed[k : k + 1], torque[k : k + 1]))
+        meter.settle(MotorWork(speed[k : k + 1], torque[k : k + 1]))
         other.add(300.0)
-    other.settle(Work(speed, torque))
+    other.settle(MotorWork(speed, torque))
     assert meter.reading().energy == pytest.approx(other.reading().energy, rel=1e-12)
     power = torque * speed + cell.robot.copper_loss * (torque / cell.robot.gear_ratio) ** 2
     bus = dc_bus(power, DT, DcBusParameters(load_power_data().dc_link_capacity_energy))
@@ -57,7 +57,7 @@ def test_braking_lifts_the_bus_voltage_up_to_the_chopper(meter):
     assert meter.reading().bus_voltage == pytest.approx(data.dc_link.voltage)
     for _ in range(500):
         meter.add(0.0)
-    meter.settle(Work(speed, torque))
+    meter.settle(MotorWork(speed, torque))
     reading = meter.reading()
     assert reading.bus_voltage == pytest.approx(data.dc_link.chopper_on, rel=1e-6)
     assert reading.energy == 0.0

@@ -15,7 +15,7 @@ from ir_description import Body, cell_hash, load_cell
 from ir_sim_driver.controller import Driver, PlannedCell, surroundings
 from ir_sim_driver.controller.driver import take_offered_cell
 from ir_sim_driver.errors import RequestRefusedError, TrajectoryRefusedError
-from ir_sim_driver.motion.goal import ErrorCode, Outcome, TrajectoryGoal
+from ir_sim_driver.motion.goal import ErrorCode, GoalOutcome, TrajectoryGoal
 from ir_sim_driver.node.announcements import announced
 from ir_sim_driver.plant import carried, custom_load
 
@@ -136,7 +136,7 @@ def test_a_trajectory_waits_for_its_cell_which_may_come_later(make, plan, monkey
     simulation = make()
     driver = Driver(simulation)
     trajectory = movement(plan, simulation)
-    outcomes: list[Outcome] = []
+    outcomes: list[GoalOutcome] = []
     try:
         goal = TrajectoryGoal(trajectory, cell_hash=cell_hash(DEMO))
         driver.submit(2, lambda: goal, outcomes.append)

@@ -21,8 +21,8 @@ from ir_sim_driver.plc import OpenLink
 from ir_sim_driver.plc.modbus import (
     COILS,
     OPERATING_MODE,
+    ClientLimits,
     ControllerTables,
-    Limits,
     ModbusServer,
     ModbusTcp,
     answered,
@@ -107,7 +107,9 @@ def test_a_hundred_silent_clients_leave_a_place_and_no_line_in_the_log(
 
 def test_who_asks_keeps_its_place_among_silent_ones(driver: Driver) -> None:
     """On a clock of the server's own: a busy machine would keep the PLC silent as well."""
-    server = ModbusServer("127.0.0.1", 0, ControllerTables(driver.plc, 2.0), Limits(connections=2))
+    server = ModbusServer(
+        "127.0.0.1", 0, ControllerTables(driver.plc, 2.0), ClientLimits(connections=2)
+    )
     now = [0.0]
     server._loop.time = lambda: now[0]  # type: ignore[method-assign]
     plc = connected(server.port)

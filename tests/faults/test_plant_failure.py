@@ -12,7 +12,7 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver import (
     Driver,
     ErrorCode,
-    Outcome,
+    GoalOutcome,
     RequestRefusedError,
     TrajectoryGoal,
     make_simulation,
@@ -22,7 +22,7 @@ from ir_sim_driver.plc import SERVICE
 
 
 @pytest.fixture
-def broken(monkeypatch: pytest.MonkeyPatch) -> tuple[Driver, list[Outcome]]:
+def broken(monkeypatch: pytest.MonkeyPatch) -> tuple[Driver, list[GoalOutcome]]:
     """A driver whose plant has failed in the middle of a goal."""
     simulation = make_simulation("open", backend="ideal")
     driver = Driver(simulation)
@@ -50,7 +50,7 @@ def broken(monkeypatch: pytest.MonkeyPatch) -> tuple[Driver, list[Outcome]]:
 
 
 def test_no_request_is_answered_with_success_over_a_dead_plant(
-    broken: tuple[Driver, list[Outcome]],
+    broken: tuple[Driver, list[GoalOutcome]],
 ) -> None:
     driver, _ = broken
     requests = (
@@ -69,14 +69,14 @@ def test_no_request_is_answered_with_success_over_a_dead_plant(
 
 
 def test_goals_end_with_a_status_those_that_run_and_those_that_come(
-    broken: tuple[Driver, list[Outcome]],
+    broken: tuple[Driver, list[GoalOutcome]],
 ) -> None:
     _, outcomes = broken
     assert [outcome.code for outcome in outcomes] == [ErrorCode.INVALID_GOAL] * 2
     assert all("no such body" in outcome.sentence for outcome in outcomes)
 
 
-def test_diagnostics_say_so(broken: tuple[Driver, list[Outcome]]) -> None:
+def test_diagnostics_say_so(broken: tuple[Driver, list[GoalOutcome]]) -> None:
     snapshot = broken[0].snapshot(0.0)
     plant = snapshot.entries[0]
     assert plant.level is Level.ERROR

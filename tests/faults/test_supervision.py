@@ -23,7 +23,7 @@ from ir_sim_driver import (
     make_simulation,
 )
 from ir_sim_driver.controller.outputs import report
-from ir_sim_driver.controller.supervision import Command, Supervision, SupervisionSettings
+from ir_sim_driver.controller.supervision import CommandedPosition, Supervision, SupervisionSettings
 from ir_sim_driver.notices import Level
 from ir_sim_driver.plant import Backend
 
@@ -64,7 +64,7 @@ def seen(looks: list[tuple[np.ndarray, np.ndarray, bool]], deviation: float = 0.
     fault = None
     for q, qd, saturated in looks:
         backend = cast(Backend, SimpleNamespace(q=q.copy(), qd=qd, saturated=saturated))
-        fault = fault or watch.look(backend, Command(q, deviation, 5e-3), braking=False)
+        fault = fault or watch.look(backend, CommandedPosition(q, deviation, 5e-3), braking=False)
     return fault.sentence if fault is not None else ""
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ir_krl import Blend, Followed, Motion, Stop, follow, parse
+from ir_krl import AdvanceStop, Blend, Followed, Motion, follow, parse
 from ir_planner import Planner
 from ir_planner.krl.execution import DrivenStep, drive
 
@@ -197,7 +197,7 @@ def test_a_load_of_a_tool_is_carried_where_a_form_names_it(followed: Follow) -> 
 
 def test_a_stop_is_said_where_it_is(followed: Follow) -> None:
     program = followed(f"{HEAD}PTP {{A1 9}} C_PTP\nWAIT SEC 0\nPTP {{A1 0}}")
-    stop = next(one for one in program.commands if isinstance(one, Stop))
+    stop = next(one for one in program.commands if isinstance(one, AdvanceStop))
     assert (stop.why, stop.place.line) == ("WAIT SEC 0", 5)
     said = "WAIT SEC 0 stops the advance run: the motion before ends at rest"
     assert said in [note.text for note in program.notes]

@@ -16,7 +16,7 @@ from ir_krl import (
     KrlError,
     Motion,
     SetOutput,
-    Wait,
+    StandStill,
     follow,
     parse,
     read_project,
@@ -272,7 +272,7 @@ def test_what_follows_from_the_program_is_no_assumption(name: str, followed: Fol
 @pytest.mark.parametrize("begun", [-300, 0, 200])
 def test_a_timer_that_was_started_just_before_is_waited_for(begun: int, followed: Follow) -> None:
     started = f"$TIMER[1]={begun}\n$TIMER_STOP[1]=FALSE\nWAIT SEC 0.1\nWAIT FOR $TIMER[1]>500"
-    waits = [one.seconds for one in followed(started).commands if isinstance(one, Wait)]
+    waits = [one.seconds for one in followed(started).commands if isinstance(one, StandStill)]
     assert sum(waits) == pytest.approx((500 - begun) / 1e3)
     unknown = followed("$TIMER_STOP[1]=FALSE\nWAIT FOR $TIMER[1]>500")
     assert any("nobody knows how long" in text for text in texts(unknown))
@@ -352,7 +352,7 @@ def test_a_setting_counts_more_than_a_data_list(followed: Follow) -> None:
     chosen = [settings_of(["; half", "", "N=2", "$IN[3]=TRUE"], "half.txt")]
     lines = "IF $IN[3] THEN\nWAIT SEC N\nENDIF"
     (wait,) = followed(lines, "DECL INT N=8", settings=chosen).commands
-    assert isinstance(wait, Wait)
+    assert isinstance(wait, StandStill)
     assert wait.seconds == 2.0
     with pytest.raises(KrlError, match=r"half.txt: 'N 2' is no NAME=VALUE"):
         settings_of(["N 2"], "half.txt")
@@ -362,7 +362,7 @@ def test_the_value_of_an_unknown_routine_can_be_set(followed: Follow) -> None:
     lines = "IF KIND( )==3 THEN\nWAIT SEC 3\nENDIF"
     assert followed(lines).commands == ()
     (wait,) = followed(lines, settings=[settings_of(["KIND=3"])]).commands
-    assert isinstance(wait, Wait)
+    assert isinstance(wait, StandStill)
 
 
 def test_what_an_unknown_routine_was_given_may_have_changed(followed: Follow) -> None:
@@ -380,7 +380,7 @@ def test_what_an_unknown_routine_was_given_may_have_changed(followed: Follow) ->
 def test_a_setting_reaches_variables_of_a_routine(name: str, followed: Follow) -> None:
     lines = f"STRUC t INT p,q\nDECL t s\nDECL INT x,a[3]\nWAIT SEC {name}"
     (wait,) = followed(lines, settings=[settings_of([f"{name}=5"])]).commands
-    assert isinstance(wait, Wait)
+    assert isinstance(wait, StandStill)
     assert wait.seconds == 5
 
 
@@ -412,7 +412,7 @@ def test_a_wait_for_one_of_several_ends_by_one_of_them(condition: str, followed:
     inputs, wanted = ENDED[condition]
     read = "\n".join(f"IF $IN[{n}] THEN\nWAIT SEC {n}\nENDIF" for n in (1, 2, 3))
     program = followed(f"WAIT FOR {condition}\n{read}", inputs=inputs)
-    waited = {one.seconds for one in program.commands if isinstance(one, Wait)}
+    waited = {one.seconds for one in program.commands if isinstance(one, StandStill)}
     assert "".join("1" if n in waited else "0" for n in (1, 2, 3)) == wanted
 
 
@@ -462,7 +462,7 @@ def test_an_input_that_was_waited_for_is_as_it_was_waited_for(followed: Follow) 
     waited = "WAIT FOR $IN[1] AND NOT ($IN[2] OR ($IN[3]==TRUE)) AND ($IN[4]<>FALSE)"
     lines = f"{waited}\nIF $IN[1] AND NOT $IN[2] AND NOT $IN[3] AND $IN[4] THEN\nWAIT SEC 1\nENDIF"
     program = followed(lines)
-    assert isinstance(program.commands[-1], Wait)
+    assert isinstance(program.commands[-1], StandStill)
     assert texts(program) == []
 
 
@@ -550,7 +550,7 @@ def test_kinematics_are_computed_both_ways(planner: Planner) -> None:
         assert motion.target.axes is not None
         found = np.degrees([motion.target.axes[f"A{k}"] for k in range(1, 7)])
         assert found == pytest.approx(wanted, abs=1e-3)
-        assert [one.seconds for one in waits if isinstance(one, Wait)] == [1, 1]
+        assert [one.seconds for one in waits if isinstance(one, StandStill)] == [1, 1]
 
 
 def test_where_the_robot_stands_is_known(planner: Planner) -> None:
@@ -605,7 +605,7 @@ def test_the_modules_of_a_project_are_one_program(tmp_path: Path, archived: bool
     sources, left_out = found.sources(found.main("MAIN"))
     program = follow(sources, np.zeros(6), np.eye(4))
     assert angles(program) == [7.0, 8.0]
-    assert [one.seconds for one in program.commands if isinstance(one, Wait)] == [0.5]
+    assert [one.seconds for one in program.commands if isinstance(one, StandStill)] == [0.5]
     assert sum("broken.src:2:" in str(note) for note in left_out) == 1
     others = [str(note) for note in left_out if "has the same name and is nearer" in str(note)]
     assert len(others) == len(left_out) - 1 == 1, left_out

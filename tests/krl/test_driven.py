@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_description.poses import abc_from_rotation, rotation_from_abc
-from ir_krl import Followed, KrlMotionError, Place, Target, follow, parse
+from ir_krl import Followed, KrlMotionError, SourcePlace, Target, follow, parse
 from ir_planner import Planner
 from ir_planner.krl import evaluate_krl, tool_in_flange
 from ir_planner.krl.execution import drive
@@ -55,7 +55,7 @@ def test_status_and_turn_find_the_taught_configuration_again(planner: Planner, s
     target = Target(
         None, dict(zip("XYZABC", values, strict=True)), status, turn, False, False, np.eye(4), tool
     )
-    found = arm.reached(target, planner.cell.machine_home, Place())
+    found = arm.reached(target, planner.cell.machine_home, SourcePlace())
     assert np.abs(found - q).max() < np.radians(1e-4)
 
 

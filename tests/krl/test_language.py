@@ -16,8 +16,8 @@ from ir_krl import (
     Motion,
     SetOutput,
     SplineBlock,
-    Wait,
-    WaitFor,
+    StandStill,
+    WaitForCondition,
     follow,
     parse,
 )
@@ -102,7 +102,7 @@ WAITS = {  # statements that end in WAIT SEC of what they compute
 def test_what_a_program_computes(name: str, followed: Follow) -> None:
     lines, seconds = WAITS[name]
     *_, wait = followed(lines).commands
-    assert isinstance(wait, Wait)
+    assert isinstance(wait, StandStill)
     assert wait.seconds == pytest.approx(seconds, abs=1e-9)
 
 
@@ -240,7 +240,7 @@ def test_subprograms_and_functions() -> None:
         "DEFFCT REAL HALF(X:IN)\nRETURN X/2.0\nENDFCT\n"
     )
     (wait,) = follow([parse(text, "m.src")], np.zeros(6), np.eye(4)).commands
-    assert isinstance(wait, Wait)
+    assert isinstance(wait, StandStill)
     assert wait.seconds == pytest.approx(5.5)
 
 
@@ -314,7 +314,7 @@ def test_outputs_waits_triggers_and_pulses(followed: Follow) -> None:
     ]
     assert isinstance(pulse, SetOutput)
     assert pulse.pulse == 0.5
-    assert isinstance(wait, WaitFor)
+    assert isinstance(wait, WaitForCondition)
     assert wait.condition == "($IN[2] AND NOT $IN[3])"
 
 
@@ -338,7 +338,7 @@ def test_a_group_of_inputs_chooses_the_case(followed: Follow) -> None:
     for value in range(8):
         inputs = {11 + k: bool(value >> k & 1) for k in range(3)}
         (wait,) = followed(lines, inputs=inputs).commands
-        assert isinstance(wait, Wait)
+        assert isinstance(wait, StandStill)
         assert wait.seconds == {1: 1.0, 2: 1.0, 6: 6.0}.get(value, 9.0)
 
 
@@ -402,7 +402,7 @@ def test_signals_decide_as_they_are_given(followed: Follow) -> None:
     lines = "IF $IN[4] THEN\nWAIT SEC 1\nELSE\nWAIT SEC 2\nENDIF"
     for value, seconds in ((True, 1.0), (False, 2.0)):
         (wait,) = followed(lines, inputs={4: value}).commands
-        assert isinstance(wait, Wait)
+        assert isinstance(wait, StandStill)
         assert wait.seconds == seconds
 
 

@@ -11,21 +11,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_krl import Command, Followed, Motion, Place, SetOutput, Speeds, Target, Wait
+from ir_krl import Command, Followed, Motion, SetOutput, SourcePlace, Speeds, StandStill, Target
 from ir_planner import Planner
 from ir_planner.krl.execution import drive, process_motions
 
 SPEEDS = Speeds((1.0,) * 6, (1.0,) * 6, 0.1, 1.0, 1.0, 1.0, 1.0)
 TARGET = Target(None, {"X": 1.0}, None, None, True, False, np.eye(4), np.eye(4))
 COMMANDS: dict[str, Command] = {
-    "p": Motion("ptp", TARGET, SPEEDS, Place()),
-    "l": Motion("lin", TARGET, SPEEDS, Place()),
-    "w": Wait(1.0, Place()),
-    "A": SetOutput(1, True, Place()),
-    "a": SetOutput(1, False, Place()),
-    "B": SetOutput(2, True, Place(), on_path=True),
-    "b": SetOutput(2, False, Place()),
-    "P": SetOutput(1, True, Place(), pulse=0.5),
+    "p": Motion("ptp", TARGET, SPEEDS, SourcePlace()),
+    "l": Motion("lin", TARGET, SPEEDS, SourcePlace()),
+    "w": StandStill(1.0, SourcePlace()),
+    "A": SetOutput(1, True, SourcePlace()),
+    "a": SetOutput(1, False, SourcePlace()),
+    "B": SetOutput(2, True, SourcePlace(), on_path=True),
+    "b": SetOutput(2, False, SourcePlace()),
+    "P": SetOutput(1, True, SourcePlace(), pulse=0.5),
 }
 
 

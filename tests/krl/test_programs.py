@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ir_krl import KrlError, SetOutput, Wait
+from ir_krl import KrlError, SetOutput, StandStill
 from ir_planner import Planner
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
@@ -45,7 +45,7 @@ def test_a_program_does_what_its_comments_expect(path: Path, planner: Planner) -
     for count in expected(text, r";expects (\d+) outputs"):
         assert sum(isinstance(one, SetOutput) for one in program.commands) == int(count)
     for seconds in expected(text, r";expects ([\d.]+) seconds of waits"):
-        waits = sum(one.seconds for one in program.commands if isinstance(one, Wait))
+        waits = sum(one.seconds for one in program.commands if isinstance(one, StandStill))
         assert waits == pytest.approx(float(seconds))
     for seconds in expected(text, r";expects ([\d.]+) seconds of motion"):
         assert sum(one.duration for one in moves) == pytest.approx(float(seconds))

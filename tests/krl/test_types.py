@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from ir_krl import Effect, Followed, KrlRunError, Motion, Wait, follow, parse
+from ir_krl import Effect, Followed, KrlRunError, Motion, StandStill, follow, parse
 
 Follow = Callable[..., Followed]
 ROBOT = (np.zeros(6), np.eye(4))  # home and tool
@@ -55,7 +55,7 @@ def test_a_variable_holds_what_its_type_holds(
     kind, written = held
     lines, data, name = (one.format(k=kind, v=written) for one in DECLARED[way])
     *_, wait = followed(f"{lines}\nWAIT SEC {name}/2\nWAIT SEC 99", data).commands[:-1]
-    assert isinstance(wait, Wait)
+    assert isinstance(wait, StandStill)
     assert wait.seconds == half(HELD[held])
 
 
@@ -68,7 +68,7 @@ def test_parameters_and_results_have_types(held: tuple[str, str], kept: str) -> 
         f"DEFFCT {kind} {kept}\nDECL {kind} x\nDECL REAL y\ny=x\nRETURN y\nENDFCT\n"
     )
     (wait,) = follow([parse(text, "p.src")], *ROBOT).commands
-    assert isinstance(wait, Wait)
+    assert isinstance(wait, StandStill)
     assert wait.seconds == half(HELD[held])
 
 
@@ -111,7 +111,7 @@ def test_reals_are_of_single_precision(sign: str, followed: Follow) -> None:
         wanted = OPERATIONS[sign](np.float32(a), np.float32(b))
         lines = f"x={a}{sign}{b}\ny={abs(wanted):.9g}\nIF ABS(x)==y THEN\nWAIT SEC 1\nENDIF"
         program = followed(f"DECL REAL x,y\n{lines}")
-        assert [type(one) for one in program.commands] == [Wait]
+        assert [type(one) for one in program.commands] == [StandStill]
 
 
 KEPT = {  # lines that end in WAIT SEC of one second where they compute as a controller does
@@ -147,7 +147,7 @@ KEPT = {  # lines that end in WAIT SEC of one second where they compute as a con
 def test_numbers_and_texts_decide_as_on_a_controller(name: str, followed: Follow) -> None:
     head = "DECL REAL x,y\nDECL INT n,m[2]\nDECL BOOL b\nDECL CHAR c,s[20]\n"
     (wait,) = followed(head + KEPT[name]).commands
-    assert isinstance(wait, Wait)
+    assert isinstance(wait, StandStill)
     assert wait.seconds == 1
 
 
@@ -188,7 +188,7 @@ COUNTED = {  # lines of a loop over I: what it waits for, and what I holds behin
 def test_for_counts_by_its_variable(lines: str, followed: Follow) -> None:
     waits, behind = COUNTED[lines]
     program = followed(f"DECL INT i\n{lines}\nWAIT SEC 10+i")
-    assert [one.seconds for one in program.commands if isinstance(one, Wait)] == [
+    assert [one.seconds for one in program.commands if isinstance(one, StandStill)] == [
         *waits,
         10 + behind,
     ]
@@ -200,7 +200,7 @@ def test_a_parameter_without_a_direction_goes_back_and_says_so() -> None:
         "DEF SAME(k)\nDECL INT k\nk=k\nEND\nDEF NEW(k)\nDECL INT k\nk=7\nEND\n"
     )
     program = follow([parse(text, "p.src")], *ROBOT)
-    assert [one.seconds for one in program.commands if isinstance(one, Wait)] == [1, 7]
+    assert [one.seconds for one in program.commands if isinstance(one, StandStill)] == [1, 7]
     said = "K of NEW has neither :IN nor :OUT: taken as :OUT"
     assert [note.effect for note in program.notes if note.text == said] == [Effect.MOTIONS]
     assert len(program.notes) == 1
@@ -215,7 +215,7 @@ def test_two_modules_have_variables_of_one_name() -> None:
         parse("DEFDAT OTHER\nDECL INT n\nENDDAT\n", "other.dat"),
     ]
     (wait,) = follow(texts, *ROBOT).commands
-    assert isinstance(wait, Wait)
+    assert isinstance(wait, StandStill)
     assert wait.seconds == 2
 
 
@@ -223,6 +223,6 @@ def test_rows_of_texts_are_set_as_every_configuration_sets_them(followed: Follow
     """TOOL_NAME[1,]: the text of a row, within the rows that are declared."""
     data = 'DECL CHAR NAMES[3,24]\nNAMES[1,]="gear"\nNAMES[3,]="none"'
     program = followed("WAIT SEC STRLEN(NAMES[1,])", data)
-    assert [one.seconds for one in program.commands if isinstance(one, Wait)] == [4.0]
+    assert [one.seconds for one in program.commands if isinstance(one, StandStill)] == [4.0]
     with pytest.raises(KrlRunError, match=r"NAMES\[4\] isn't in NAMES\[3, 24\]"):
         followed('NAMES[4,]="gear"', data)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ir_cli.main import main
-from ir_krl import Effect, KrlError, Motion, SetOutput, Wait, WaitFor
+from ir_krl import Effect, KrlError, Motion, SetOutput, StandStill, WaitForCondition
 from ir_krl.urscript import (
     JointLimits,
     follow_urscript,
@@ -105,9 +105,9 @@ end
     assert second.payload.mass == 3.5
     assert isinstance(out, SetOutput)
     assert (out.number, out.value) == (5, True)
-    assert isinstance(wait, WaitFor)
+    assert isinstance(wait, WaitForCondition)
     assert wait.condition == "$IN[3]"
-    assert isinstance(sleep, Wait)
+    assert isinstance(sleep, StandStill)
     assert sleep.seconds == 1.5
     assert "rq_close isn't known" in str(found.notes[0])
 

@@ -26,7 +26,7 @@ from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.ros.topics import CommandTopic, LatestMessage, PolledTopic
 from ir_msgs_py.status import StatusCode
 from ir_recorder.format.qos import QosOffer
-from ir_recorder.node.subscriptions import Listener
+from ir_recorder.node.subscriptions import TopicListener
 
 RESPONSES = ("send_goal_response", "send_cancel_response", "send_result_response")
 
@@ -280,7 +280,7 @@ def test_without_insides_the_recorder_hears_the_bytes(
     publisher = ros_executor.run(
         lambda: ros_node.create_publisher(Int32, "/numbers", QoSProfile(depth=10))
     )
-    listener = ros_executor.run(lambda: Listener(ros_node, 10))
+    listener = ros_executor.run(lambda: TopicListener(ros_node, 10))
     ros_executor.run(lambda: listener.open("/numbers", "std_msgs/msg/Int32", [QosOffer()]))
     wait_for(publisher.get_subscription_count, what="it listens")
     heard: list[int] = []

@@ -16,9 +16,9 @@ from sensor_msgs.msg import JointState
 
 from ir_cli.ros import replan
 from ir_cli.ros.replan import (
-    Comparison,
     RecordedPlanner,
     Replanned,
+    ReplayVerdict,
     all_equal,
     planned_again,
     sentence_of,
@@ -118,7 +118,7 @@ def test_all_requests_are_planned_again_with_equal_ids_and_a_difference_is_named
     other = list(
         planned_again(RecordedPlanner(with_answers(recording, trajectory_id="0123456789abcdef")))
     )
-    assert other[0].verdict is Comparison.DIFFERENT
+    assert other[0].verdict is ReplayVerdict.DIFFERENT
     assert other[0].sentence.startswith("trajectory_id was 0123456789abcdef, is ")
     assert not all_equal(other)
 
@@ -145,7 +145,7 @@ def with_answers(recording: RawRecording, trajectory_id: str) -> RawRecording:
 
 
 def test_answers_that_cannot_be_the_same_are_not_compared() -> None:
-    found = [Replanned("/ir_planner/plan", 0, Comparison.NOT_COMPARED, "it was cancelled")]
+    found = [Replanned("/ir_planner/plan", 0, ReplayVerdict.NOT_COMPARED, "it was cancelled")]
     assert not all_equal(found)
     assert "1 not compared" in sentence_of(found, [])
     assert sentence_of(found, ["numpy 1.0 there, 2.0 here"]).endswith("numpy 1.0 there, 2.0 here")

@@ -21,12 +21,12 @@ from ir_planner import Planner
 from ir_planner.checks import Consumption
 from ir_planner.errors import RequestError
 from ir_planner.program.bounds import Rates
-from ir_planner.program.cycle_time import Task, shared_out
+from ir_planner.program.cycle_time import CycleTask, shared_out
 from ir_planner.program.movement_fronts import (
     FASTEST,
     LADDER,
+    FrontPoint,
     Ladder,
-    Point,
     TimeValues,
     convex_front,
 )
@@ -65,11 +65,11 @@ class Values:
 
     def __init__(self, fronts: list[list[tuple[float, float]]]) -> None:
         self.points = {
-            HopPart(k, "across", 0, 0): [Point.of(invented(*point)) for point in front]
+            HopPart(k, "across", 0, 0): [FrontPoint.of(invented(*point)) for point in front]
             for k, front in enumerate(fronts)
         }
 
-    def fronts(self) -> dict[HopPart, list[Point]]:
+    def fronts(self) -> dict[HopPart, list[FrontPoint]]:
         """Convex ones."""
         return {part: convex_front(points) for part, points in self.points.items()}
 
@@ -100,7 +100,7 @@ def test_no_choice_of_points_with_a_wait_costs_less(
 ) -> None:
     values = Values(fronts)
     seconds = sum(min(t for t, _ in front) for front in fronts) + more
-    task = Task(seconds, lambda left: watts * left, values.slower)
+    task = CycleTask(seconds, lambda left: watts * left, values.slower)
     found = shared_out(cast(TimeValues, values), task)
     assert found is not None
     used = sum(cast(Any, movement).seconds for movement in found.movements.values())
@@ -120,7 +120,7 @@ def test_a_front_is_convex_and_nothing_lies_below_it(
     fronts: list[list[tuple[float, float]]],
 ) -> None:
     for points in fronts:
-        front = convex_front([Point.of(invented(*point)) for point in points])
+        front = convex_front([FrontPoint.of(invented(*point)) for point in points])
         t = np.array([p.seconds for p in front])
         e = np.array([p.joules for p in front])
         assert (np.diff(t) > 0.0).all()
@@ -132,7 +132,10 @@ def test_a_front_is_convex_and_nothing_lies_below_it(
 
 def test_too_short_a_time_has_no_answer() -> None:
     values = Values([[(1.0, 100.0)], [(2.0, 100.0)]])
-    assert shared_out(cast(TimeValues, values), Task(2.9, lambda left: 0.0, values.slower)) is None
+    assert (
+        shared_out(cast(TimeValues, values), CycleTask(2.9, lambda left: 0.0, values.slower))
+        is None
+    )
 
 
 ACROSS_PART = HopPart(0, "across", 0, 0)

@@ -13,9 +13,9 @@ import pytest
 from ir_planner.cycle import (
     ArmWork,
     Curve,
+    ExclusiveZone,
     JointCycle,
     WaitMode,
-    Zone,
     ZoneStretch,
     cheapest_joint,
     shortest_joint,
@@ -44,7 +44,7 @@ def drawn_work(rng: np.random.Generator, count: int) -> ArmWork:
     )
 
 
-def drawn(seed: int, robots: int = 2) -> tuple[list[ArmWork], list[Zone]]:
+def drawn(seed: int, robots: int = 2) -> tuple[list[ArmWork], list[ExclusiveZone]]:
     """Robots with a zone or two between each pair of neighbours, none over the end of a program."""
     rng = np.random.default_rng([seed, robots])
     works = [drawn_work(rng, int(rng.integers(4, 7))) for _ in range(robots)]
@@ -54,11 +54,11 @@ def drawn(seed: int, robots: int = 2) -> tuple[list[ArmWork], list[Zone]]:
             stretches = [
                 ZoneStretch(robot, 2 * side, int(rng.integers(1, 3))) for robot in (k, k + 1)
             ]
-            zones.append(Zone(stretches[0], stretches[1]))
+            zones.append(ExclusiveZone(stretches[0], stretches[1]))
     return works, zones
 
 
-def cheapest(works: list[ArmWork], zones: list[Zone], period: float) -> JointCycle:
+def cheapest(works: list[ArmWork], zones: list[ExclusiveZone], period: float) -> JointCycle:
     found = cheapest_joint(works, zones, period)
     assert found is not None
     return found
@@ -70,7 +70,7 @@ def stretch_times(cycle: JointCycle, stretch: ZoneStretch) -> tuple[float, float
     return arm.begin[stretch.first], arm.begin[last] + arm.seconds[last]
 
 
-def judge(cycle: JointCycle, works: list[ArmWork], zones: list[Zone]) -> float:
+def judge(cycle: JointCycle, works: list[ArmWork], zones: list[ExclusiveZone]) -> float:
     """Joules of a schedule; what isn't right about it fails."""
     joules = 0.0
     for arm, work in zip(cycle.arms, works, strict=True):
@@ -127,7 +127,9 @@ def test_a_zone_never_makes_a_cycle_cheaper_and_the_order_of_robots_says_nothing
     with_zones = cheapest(works, zones, period).joules
     assert with_zones >= cheapest(works, zones[:1], period).joules * (1.0 - 1e-6)
     assert with_zones >= cheapest(works, [], period).joules * (1.0 - 1e-6)
-    turned = [Zone(replace(zone.other, robot=0), replace(zone.one, robot=1)) for zone in zones]
+    turned = [
+        ExclusiveZone(replace(zone.other, robot=0), replace(zone.one, robot=1)) for zone in zones
+    ]
     other = shortest_joint(works[::-1], turned)
     assert other is not None
     assert other.period == pytest.approx(fastest.period, rel=1e-6)
@@ -186,4 +188,4 @@ def test_every_meeting_is_in_one_zone_and_zones_leave_something_between(seed: in
     again = zones_of((4, 7), counts, dict(reversed(list(cells.items()))))
     assert again == zones
     turned = zones_of((7, 4), counts[::-1], {(b, a): () for a, b in cells})
-    assert sorted(Zone(z.other, z.one) for z in turned) == list(zones)
+    assert sorted(ExclusiveZone(z.other, z.one) for z in turned) == list(zones)

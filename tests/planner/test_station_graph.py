@@ -14,7 +14,7 @@ from ir_planner.program.station_graph import (
     ACROSS,
     ENTER,
     LEAVE,
-    Hop,
+    HopBounds,
     HopPart,
     Settled,
     StationGraph,
@@ -33,14 +33,14 @@ class World:
     share: float
     asked: list[HopPart] = field(default_factory=list)
 
-    def hops(self) -> list[Hop]:
+    def hops(self) -> list[HopBounds]:
         """Bounds; what is impossible looks cheap at first."""
         parts = (self.leave, self.across, self.enter)
         bounds = [
             [self.share * np.where(np.isfinite(a), a, 1.0) for a in hop]
             for hop in zip(*parts, strict=True)
         ]
-        return [Hop(*hop) for hop in bounds]
+        return [HopBounds(*hop) for hop in bounds]
 
     def cost(self, part: HopPart) -> float:
         if part.kind == LEAVE:

@@ -27,9 +27,9 @@ from ir_recorder.report.compare import comparison_html
 from ir_recorder.report.fleet import fleet_html, member_of
 from ir_recorder.report.program_comparison import before_after_html
 from ir_recorder.report.robots import robots_html
-from ir_studies.arena.figures import Run
+from ir_studies.arena.figures import ArenaRun
 from ir_studies.arena.page import page_html as arena_html
-from ir_studies.arena.settings import ArenaSettings, Entry
+from ir_studies.arena.settings import ArenaEntry, ArenaSettings
 from ir_studies.layout.page import page_html as layout_html
 from ir_studies.layout.placement import Known, Placement, payloads_of
 from ir_studies.layout.settings import LayoutSettings
@@ -117,7 +117,7 @@ def arena(_: Analysis) -> str:
                 **{"clearance_m": 0.02, "progress": [[0.1, 2.0 * cost], [0.4, cost]]},
                 **{"total_s": 1.0, "straight_free": False},
             }
-            runs.append(Run(Entry(planner, "open", task, 0, "", "synchronous"), row))
+            runs.append(ArenaRun(ArenaEntry(planner, "open", task, 0, "", "synchronous"), row))
     return arena_html(runs, settings)
 
 

@@ -20,8 +20,8 @@ import pytest
 from ir_description import cell_to_yaml, load_cell
 from ir_recorder import Analysis, analyse, findings, read_recording
 from ir_recorder.live import LiveServer, Stream
-from ir_recorder.live.cell_view import CellView, Heard
-from ir_recorder.live.server import Answer
+from ir_recorder.live.cell_view import CellView, ReceivedCell
+from ir_recorder.live.server import ButtonAnswer
 from ir_recorder.report import report_html
 from ir_recorder.report.compare import comparison_html
 
@@ -236,15 +236,15 @@ def live() -> Iterator[tuple[LiveServer, Stream, list[tuple[str, bool]]]]:
     view = CellView()
     robot = load_cell("demo").robot
 
-    def press(name: str, value: bool) -> Answer:
+    def press(name: str, value: bool) -> ButtonAnswer:
         pressed.append((name, value))
-        return Answer(False, EVIL)
+        return ButtonAnswer(False, EVIL)
 
     server = LiveServer(stream, press, lambda: view.scene)
     text = cell_to_yaml(load_cell("demo"))
     for k in range(40):
         q = np.radians([k, -90.0, 90.0, 0.0, 0.0, 0.0])
-        looked = view.look(Heard(text, joints=robot.joint_names, q=q, load="gripper"))
+        looked = view.look(ReceivedCell(text, joints=robot.joint_names, q=q, load="gripper"))
         levels = {"ab": False, "move_enable": True, "operating_mode": "EXT"}
         step = {"label": EVIL, "kind": EVIL, "event": "started", "at": [1, 27], "note": EVIL}
         machine = {"name": EVIL, "state": EVIL, "next": EVIL}

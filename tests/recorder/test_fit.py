@@ -25,7 +25,7 @@ from ir_description import (
     physical_bounds,
 )
 from ir_recorder.errors import RecorderError
-from ir_recorder.fit import Fit, Source, fit, fit_data, sentences
+from ir_recorder.fit import DataSource, Fit, fit, fit_data, sentences
 from ir_recorder.fit.data import check_range, check_readings, check_speed
 from ir_recorder.fit.estimate import by_window
 from ir_recorder.measure import PowerModel, Samples, movements
@@ -288,4 +288,4 @@ def test_what_is_held_all_the_time_is_refused_where_the_cell_does_not_have_it(
     with pytest.raises(
         RecorderError, match=f"^load '{name}' is unknown, known are gear, gripper, none"
     ):
-        fit_data(Source(Path("joints.csv"), cell=CELL, load=load), PRIOR)
+        fit_data(DataSource(Path("joints.csv"), cell=CELL, load=load), PRIOR)

@@ -14,7 +14,7 @@ import pytest
 from ir_description import PowerParameters, RobotModel, data_sheet_of, load_cell, load_robot
 from ir_recorder.errors import RecorderError
 from ir_recorder.fit import Estimate, LeftOut, fit, left_out, recommendation, shaft_work
-from ir_recorder.fit.data import Source, fit_data, without_turns
+from ir_recorder.fit.data import DataSource, fit_data, without_turns
 from ir_recorder.measure import PowerModel, Samples, samples_of
 from ir_recorder.measure.arm import arm_torques
 from ir_recorder.traces import Trace
@@ -234,7 +234,7 @@ def test_the_clock_of_a_slow_meter_is_found(period: float, shift: float, tmp_pat
     np.savetxt(
         meter, np.column_stack([time + shift, means]), "%.9g", ",", header="time,power", comments=""
     )
-    source = Source(tmp_path / "joints.csv", meter, cell=load_cell("kr6_bench"), load="none")
+    source = DataSource(tmp_path / "joints.csv", meter, cell=load_cell("kr6_bench"), load="none")
     data = fit_data(source, prior)
     (said,) = (note for note in data.notes if "on its clock" in note)
     found = float(said.split(": ")[1].split(" s ")[0])

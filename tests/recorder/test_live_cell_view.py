@@ -18,7 +18,7 @@ from ir_kernels import Chain
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.analysis.clearance import collision_model
-from ir_recorder.live.cell_view import PATH_POINTS, CellView, Heard
+from ir_recorder.live.cell_view import PATH_POINTS, CellView, ReceivedCell
 from ir_recorder.live.stream import states_of
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
@@ -30,11 +30,11 @@ def cell() -> Cell:
 
 
 @pytest.fixture
-def heard(cell: Cell) -> Heard:
-    return Heard(cell_to_yaml(cell), joints=cell.robot.joint_names, q=HOME, load="gripper")
+def heard(cell: Cell) -> ReceivedCell:
+    return ReceivedCell(cell_to_yaml(cell), joints=cell.robot.joint_names, q=HOME, load="gripper")
 
 
-def test_the_nearest_pair_is_that_of_the_cell_as_it_stands(cell: Cell, heard: Heard) -> None:
+def test_the_nearest_pair_is_that_of_the_cell_as_it_stands(cell: Cell, heard: ReceivedCell) -> None:
     view = CellView()
     for load in ("gripper", "none", "gripper+gear"):
         near: Any = view.look(replace(heard, load=load))["near"]
@@ -47,7 +47,7 @@ def test_the_nearest_pair_is_that_of_the_cell_as_it_stands(cell: Cell, heard: He
         assert " – " in str(pair)
 
 
-def test_in_a_pause_no_pair_is_the_nearest_as_in_a_report(heard: Heard) -> None:
+def test_in_a_pause_no_pair_is_the_nearest_as_in_a_report(heard: ReceivedCell) -> None:
     view = CellView()
     for kind, said in (("pause", False), ("regional", True)):
         near = view.look(replace(heard, movement=PlannedMovement(kind=kind)))["near"]
@@ -57,7 +57,9 @@ def test_in_a_pause_no_pair_is_the_nearest_as_in_a_report(heard: Heard) -> None:
     assert late == view.look(replace(heard, movement=with_part, load="gripper+gear"))["near"]
 
 
-def test_joints_in_another_order_are_put_right_and_strangers_show_nothing(heard: Heard) -> None:
+def test_joints_in_another_order_are_put_right_and_strangers_show_nothing(
+    heard: ReceivedCell,
+) -> None:
     view = CellView()
     q = np.radians([10.0, -80.0, 85.0, 5.0, 30.0, -20.0])
     expected = view.look(replace(heard, q=q))["near"]
@@ -71,7 +73,9 @@ def test_joints_in_another_order_are_put_right_and_strangers_show_nothing(heard:
         assert view.look(replace(heard, joints=joints, q=values))["near"] is None
 
 
-def test_a_door_that_moves_is_another_scene_and_an_unknown_state_is_none(heard: Heard) -> None:
+def test_a_door_that_moves_is_another_scene_and_an_unknown_state_is_none(
+    heard: ReceivedCell,
+) -> None:
     view = CellView()
     number = view.look(heard)["scene"]
     assert json.loads(view.scene)["frames"] == 0
@@ -92,7 +96,7 @@ def test_a_machine_that_changes_is_heard_as_recordings_have_it() -> None:
 
 
 def test_a_door_that_opens_is_drawn_and_measured_as_what_it_sweeps(
-    cell: Cell, heard: Heard
+    cell: Cell, heard: ReceivedCell
 ) -> None:
     def drawn(text: str) -> tuple[set[str], set[str], list[Any]]:
         near: Any = view.look(replace(heard, states=(("lathe", text),)))["near"]
@@ -113,7 +117,7 @@ def test_a_door_that_opens_is_drawn_and_measured_as_what_it_sweeps(
     assert drawn("door_open")[0] == before  # and the states of the cell stay those of its file
 
 
-def test_parts_lie_where_the_steps_of_the_program_put_them(heard: Heard) -> None:
+def test_parts_lie_where_the_steps_of_the_program_put_them(heard: ReceivedCell) -> None:
     view = CellView()
     start = view.look(heard)["lies"]
     assert set(start) == {"gear"}  # type: ignore[arg-type]
@@ -124,7 +128,7 @@ def test_parts_lie_where_the_steps_of_the_program_put_them(heard: Heard) -> None
     assert view.look(replace(heard, ended=(None,)))["lies"] == start
 
 
-def test_a_planned_path_is_where_the_tool_goes(cell: Cell, heard: Heard) -> None:
+def test_a_planned_path_is_where_the_tool_goes(cell: Cell, heard: ReceivedCell) -> None:
     goal = np.radians([30.0, -70.0, 80.0, 0.0, 20.0, 0.0])
     path = JointTrajectory.from_seconds(cell.robot.joint_names, [0.0, 2.0], [HOME, goal])
     packed = CellView().look(replace(heard, path=path))["path"]
@@ -135,9 +139,9 @@ def test_a_planned_path_is_where_the_tool_goes(cell: Cell, heard: Heard) -> None
     assert CellView().look(replace(heard, path=other))["path"] == ""
 
 
-def test_a_cell_that_cannot_be_read_is_a_sentence_until_the_next_one(heard: Heard) -> None:
+def test_a_cell_that_cannot_be_read_is_a_sentence_until_the_next_one(heard: ReceivedCell) -> None:
     view = CellView()
-    assert view.look(Heard())["scene"] == ""
+    assert view.look(ReceivedCell())["scene"] == ""
     broken = view.look(replace(heard, cell="format: ir_cell/1\nname: '<script>'\n"))
     assert "can't be read" in str(broken["problem"])
     assert view.scene == b""

@@ -20,9 +20,9 @@ from ir_recorder.live.server import (
     MOST_BODY,
     MOST_WAITING,
     MOST_WATCHING,
-    Answer,
-    Command,
+    ButtonAnswer,
     Commands,
+    LevelCommand,
     LiveServer,
 )
 from ir_recorder.live.stream import Stream
@@ -39,9 +39,9 @@ class Cell:
         self.pressed: list[tuple[str, bool]] = []
         self.server = LiveServer(self.stream, self.press, lambda: self.scene)
 
-    def press(self, name: str, value: bool) -> Answer:
+    def press(self, name: str, value: bool) -> ButtonAnswer:
         self.pressed.append((name, value))
-        return Answer(True, "set")
+        return ButtonAnswer(True, "set")
 
     def ask(self, method: str, path: str, body: str | None = None, **headers: str) -> HTTPResponse:
         """An answer; headers by name with _ for -, None for those that a browser sends by
@@ -147,12 +147,12 @@ def test_what_is_no_bit_is_refused_and_too_many_at_once_too() -> None:
     ]
     for thread in waiting:
         thread.start()
-    taken: list[Command] = []
+    taken: list[LevelCommand] = []
     while len(taken) < MOST_WAITING:
         taken += commands.take()
     for command in taken:
         command.answer(True, "set")
-        assert command.wait() == Answer(True, "set")
+        assert command.wait() == ButtonAnswer(True, "set")
     for thread in waiting:
         thread.join()
 
@@ -238,7 +238,7 @@ def test_a_stop_finds_a_place_among_waiting_requests_and_refuses_what_was_asked_
 ) -> None:
     """As release, conf_mess and drives_on of another browser: they would follow the press."""
     commands = Commands()
-    answers: list[Answer] = []
+    answers: list[ButtonAnswer] = []
 
     def ask(name: str, value: bool) -> threading.Thread:
         thread = threading.Thread(target=lambda: answers.append(commands.press(name, value)))

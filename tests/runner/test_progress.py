@@ -7,7 +7,7 @@ import numpy as np
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_program_runner.program import Progress
+from ir_program_runner.program import RunProgress
 
 
 def move(start=0.0, end=0.0, **fields):
@@ -20,7 +20,7 @@ def move(start=0.0, end=0.0, **fields):
 
 
 def test_the_rest_of_a_program_is_what_is_planned():
-    progress = Progress(
+    progress = RunProgress(
         "id", [move(duration=2.0), PlannedMovement(kind="pause", duration=10.0)], started=0.0
     )
     progress.begin(0)

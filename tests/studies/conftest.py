@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from ir_studies import Means
-from ir_studies.arena import ArenaSettings, Finished, run_arena
+from ir_studies.arena import ArenaSettings, FinishedArena, run_arena
 from ir_studies.work.means import Progress, nobody
 
 sys.path.append(
@@ -17,7 +17,7 @@ sys.path.append(
 )  # scripts, imported from their folder
 
 WORKER = Path(__file__).with_name("fake_worker.py")
-Fought = Callable[..., Finished]
+Fought = Callable[..., FinishedArena]
 
 
 @pytest.fixture
@@ -38,7 +38,7 @@ def fought(tmp_path: Path, command: tuple[str, ...]) -> Fought:
         progress: Progress = nobody,
         hang_after: float = 60.0,
         parquet: bool = False,
-    ) -> Finished:
+    ) -> FinishedArena:
         settings = ArenaSettings(
             cells=("open",),
             planners=planners,

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from ir_studies.arena.figures import (
+    ArenaRun,
     Compared,
-    Run,
     asked_alike,
     blocked_and_free,
     columns,
@@ -21,15 +21,15 @@ from ir_studies.arena.figures import (
     success_over_time,
 )
 from ir_studies.arena.page import verdict
-from ir_studies.arena.runs import Finished
-from ir_studies.arena.settings import ArenaSettings, Entry
+from ir_studies.arena.runs import FinishedArena
+from ir_studies.arena.settings import ArenaEntry, ArenaSettings
 
 
-def run(planner: str, task: str, cost: float, first: float, final: float) -> Run:
+def run(planner: str, task: str, cost: float, first: float, final: float) -> ArenaRun:
     """A solved run, or with a cost of NaN one that wasn't."""
-    entry = Entry(planner, "open", task, 0, "", "synchronous")
+    entry = ArenaEntry(planner, "open", task, 0, "", "synchronous")
     if math.isnan(cost):
-        return Run(entry, {"solved": False, "total_s": 1.0})
+        return ArenaRun(entry, {"solved": False, "total_s": 1.0})
     row = {
         "solved": True,
         "cost_j": cost,
@@ -38,7 +38,7 @@ def run(planner: str, task: str, cost: float, first: float, final: float) -> Run
         "movement_cost": cost,
     }
     progress = [[first, 2.0 * cost], [final, cost]]
-    return Run(
+    return ArenaRun(
         entry,
         {**row, "duration_s": 1.0, "energy_j": cost, "clearance_m": 0.02, "progress": progress},
     )
@@ -98,9 +98,9 @@ def test_planners_are_compared_where_both_solved() -> None:
 
 
 def test_a_run_that_died_is_listed_with_its_question() -> None:
-    entry = Entry("b", "open", "1", 0, "", "synchronous")
+    entry = ArenaEntry("b", "open", "1", 0, "", "synchronous")
     free = replace(RUNS[0], row={**RUNS[0].row, "free_ptp": True})
-    lost = Run(entry, {"solved": False, "outcome": "died"})
+    lost = ArenaRun(entry, {"solved": False, "outcome": "died"})
     runs = asked_alike([free, lost, *RUNS[1::2]])
     blocked, free_ones = blocked_and_free(runs)
     assert (blocked, [one.entry for one in free_ones]) == ([RUNS[1], RUNS[3]], [free.entry, entry])
@@ -109,7 +109,7 @@ def test_a_run_that_died_is_listed_with_its_question() -> None:
 
 def test_planners_are_summed_up_with_free_questions_apart() -> None:
     free = replace(RUNS[0], row={**RUNS[0].row, "free_ptp": True})
-    rows = list(csv.DictReader(Finished((free, *RUNS[1:]), ()).summed_up.splitlines()))
+    rows = list(csv.DictReader(FinishedArena((free, *RUNS[1:]), ()).summed_up.splitlines()))
     found = [(row["free_ptp"], row["planner"], row["solved"], row["count"]) for row in rows]
     assert found == [("0", "a", "1", "1"), ("0", "b", "1", "2"), ("1", "a", "1", "1")]
 

@@ -16,21 +16,21 @@ from pyarrow import parquet
 
 from ir_description import cell_to_yaml, load_cell
 from ir_studies import Means
-from ir_studies.arena import ArenaSettings, Finished, read_settings, run_arena
+from ir_studies.arena import ArenaSettings, FinishedArena, read_settings, run_arena
 from ir_studies.arena.figures import columns
 from ir_studies.errors import FolderError, WorkerError
 from ir_studies.work.results import NAME
 
-Fought = Callable[..., Finished]
+Fought = Callable[..., FinishedArena]
 
 
-def table(finished: Finished) -> list[dict[str, str]]:
+def table(finished: FinishedArena) -> list[dict[str, str]]:
     """Rows of table.csv."""
     with finished.files[0].open() as file:
         return list(csv.DictReader(file))
 
 
-def outcomes(finished: Finished) -> dict[str, set[object]]:
+def outcomes(finished: FinishedArena) -> dict[str, set[object]]:
     """What became of the runs, by planner."""
     return {
         planner: {run.row["outcome"] for run in finished.runs if run.entry.planner == planner}

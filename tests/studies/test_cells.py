@@ -13,7 +13,7 @@ from _cells_judge import energy, faults
 
 from ir_studies import SettingsError
 from ir_studies.cells import CellAnswer, Instance, hurried, read_instances, solve_cell, written
-from ir_studies.cells.instance import EnergyCurve, Place, Stop, stay_ranges
+from ir_studies.cells.instance import EnergyCurve, StaticActivity, StopLocation, stay_ranges
 
 
 def rows_of(answer: CellAnswer) -> list[tuple[int, int, int, float, float]]:
@@ -102,7 +102,9 @@ def _costs_of_move(curve: EnergyCurve, step: float, cycle: float) -> np.ndarray:
     return np.where(inside, [curve.energy(t) for t in safe], np.inf)
 
 
-def _costs_of_stay(stop: Stop, place: Place, modes: dict, step: float, cycle: float) -> np.ndarray:
+def _costs_of_stay(
+    stop: StaticActivity, place: StopLocation, modes: dict, step: float, cycle: float
+) -> np.ndarray:
     times = np.arange(round(cycle / step) + 1) * step
     costs = np.full(len(times), np.inf)
     for mode, shortest in modes.items():
@@ -163,8 +165,10 @@ def test_a_concave_curve_is_bounded_from_below() -> None:
 
 
 def test_modes_are_disjoint_ranges_of_the_cheapest() -> None:
-    place = Place(0, 0, {0: 100.0, 1: 40.0, 2: 60.0, 3: 10.0})
-    ranges = stay_ranges(Stop(0, 1.0, 30.0, (place,)), place, {0: 0.0, 1: 5.0, 2: 8.0, 3: 20.0})
+    place = StopLocation(0, 0, {0: 100.0, 1: 40.0, 2: 60.0, 3: 10.0})
+    ranges = stay_ranges(
+        StaticActivity(0, 1.0, 30.0, (place,)), place, {0: 0.0, 1: 5.0, 2: 8.0, 3: 20.0}
+    )
     assert [(r.mode, r.least, r.most) for r in ranges] == [
         (0, 1.0, 5.0),
         (1, 5.0, 20.0),

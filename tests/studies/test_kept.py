@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from ir_studies import StoppedError
-from ir_studies.work import Job, Row, Task
+from ir_studies.work import Job, Row, StudyJob
 from ir_studies.work.cluster import IDLE_S, Kept, Stopped
 from ir_studies.work.pool import Pool
 
@@ -37,7 +37,7 @@ class Threads:
 
     def pool(self, stopped: Stopped) -> Pool:
         command = (sys.executable, "-S", "-c", WORKER, str(self.mark))
-        return Pool(Task("layout", {}, 3600.0), 1, command, stopped)
+        return Pool(StudyJob("layout", {}, 3600.0), 1, command, stopped)
 
     def row(self, study: str, **words: Any) -> Row:
         return self.kept.row(study, self.pool, Job("", words))

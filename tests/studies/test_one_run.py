@@ -11,10 +11,10 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner import Goal, MovementPlan, Planner, RequestError
 from ir_studies.arena.one_run import one_run, planned_in
-from ir_studies.arena.settings import ArenaSettings, Entry
+from ir_studies.arena.settings import ArenaEntry, ArenaSettings
 
 FURTHER = 20_000
-ENTRY = Entry("portfolio", "deep_box", "pal->bin", 3, "", "synchronous")
+ENTRY = ArenaEntry("portfolio", "deep_box", "pal->bin", 3, "", "synchronous")
 
 
 @pytest.fixture(scope="module")

@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 
 from ir_studies import WorkerError
-from ir_studies.work import Job, Task
+from ir_studies.work import Job, StudyJob
 from ir_studies.work.pool import Pool
 
-TASK = Task("arena", {}, 60.0)
+TASK = StudyJob("arena", {}, 60.0)
 HANGS = """
 import re, sys
 sys.path[:0] = {path!r}

@@ -16,11 +16,11 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner import Goal, Planner, RequestError
 from ir_planner.search.with_ompl import charge_to, missing
-from ir_studies.arena import ArenaSettings, Entry
+from ir_studies.arena import ArenaEntry, ArenaSettings
 from ir_studies.arena.one_run import charged, excuse, maker, others_time, processor_time, warm_up
 from ir_values.arrays import FloatArray
 
-ENTRY = Entry("rrt_connect", "open", "home->p1", 0, "", "synchronous")
+ENTRY = ArenaEntry("rrt_connect", "open", "home->p1", 0, "", "synchronous")
 
 
 def test_a_process_that_is_charged_counts_also_when_it_has_ended(wait_for: Any) -> None:

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from ir_recorder.analysis.intervals import Mean
 from ir_studies.layout.search import BATCH
 from ir_studies.statistics.findings import findings_of
-from ir_studies.statistics.runs import Finished
+from ir_studies.statistics.runs import FinishedStatistics
 from ir_studies.statistics.settings import StatisticsSettings
 
 WRONG = Mean(1e6, 0.0, 0.0)
@@ -85,7 +85,7 @@ def test_figures_of_the_statistics_are_those_of_the_benchmark(
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         (folder / "results.jsonl").write_text("".join(f"{json.dumps(row)}\n" for row in rows))
-        finished = Finished(StatisticsSettings("open"), tuple(rows), found, ())
+        finished = FinishedStatistics(StatisticsSettings("open"), tuple(rows), found, ())
         assert all(claim.holds for claim in recomputed(finished, folder))
         wrong = replace(
             found, comparisons=tuple(replace(one, mean=WRONG) for one in found.comparisons)

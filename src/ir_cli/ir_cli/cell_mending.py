@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from ir_cli.planning import CEILING
-from ir_cli.station_access import MARGIN, AccessLine, Visit, lines_of, visits
+from ir_cli.station_access import MARGIN, AccessLine, StationVisit, lines_of, visits
 from ir_description import AllowedContact, Cell, Equipment, Station, cell_to_yaml
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Planner
@@ -41,7 +41,7 @@ class Suggestion:
 
 
 @dataclass(frozen=True, eq=False)
-class Exit:
+class SuggestedExit:
     """The lines of one configuration in every situation at a station, with one approach distance
     [m].
     """
@@ -79,13 +79,13 @@ class Exit:
         return ", ".join(found)
 
 
-def exits(visits: Sequence[Visit], approach: float) -> list[Exit]:
+def exits(visits: Sequence[StationVisit], approach: float) -> list[SuggestedExit]:
     """One for each configuration that reaches the station of these visits."""
     found = [lines_of(visit, approach) for visit in visits]
-    return [Exit(approach, lines) for lines in zip(*found, strict=True)]
+    return [SuggestedExit(approach, lines) for lines in zip(*found, strict=True)]
 
 
-def best_exit(visits: Sequence[Visit]) -> Exit | None:
+def best_exit(visits: Sequence[StationVisit]) -> SuggestedExit | None:
     """What is nearest to the given approach: a free line, else one that contacts or a zone make
     free; None where there is neither.
     """
@@ -187,7 +187,7 @@ def mended_cell(cell: Cell) -> tuple[Cell, list[Suggestion]]:
     these are.
     """
     suggestions = list[Suggestion]()
-    situations: dict[str, list[Visit]] = {}
+    situations: dict[str, list[StationVisit]] = {}
     for visit in visits(cell):
         situations.setdefault(visit.station.name, []).append(visit)
     mended = cell
@@ -204,7 +204,7 @@ def mended_cell(cell: Cell) -> tuple[Cell, list[Suggestion]]:
     return mended, suggestions
 
 
-def _station(cell: Cell, name: str, found: Sequence[Visit]) -> tuple[Cell, list[Suggestion]]:
+def _station(cell: Cell, name: str, found: Sequence[StationVisit]) -> tuple[Cell, list[Suggestion]]:
     """The cell with what a station lacks, and what that is."""
     station = cell.station(name)
     here = exits(found, 0.0)
@@ -234,7 +234,7 @@ def _station(cell: Cell, name: str, found: Sequence[Visit]) -> tuple[Cell, list[
 
 
 def _without_line(
-    cell: Cell, name: str, found: Sequence[Visit], here: Sequence[Exit]
+    cell: Cell, name: str, found: Sequence[StationVisit], here: Sequence[SuggestedExit]
 ) -> tuple[Cell, list[Suggestion]]:
     """The same where no straight line can be free: contacts at the station itself, if these
     suffice.
@@ -259,12 +259,12 @@ def _without_line(
     return _with_zone(changed_station(cell, station), name, best), suggestions
 
 
-def _why(found: Sequence[Visit], approach: float) -> str:
+def _why(found: Sequence[StationVisit], approach: float) -> str:
     """What is in the path of the line that lacks least."""
     return max(exits(found, approach), key=lambda each: each.depth).sentence
 
 
-def _door(best: Exit, cell: Cell) -> str:
+def _door(best: SuggestedExit, cell: Cell) -> str:
     """What moves the body in the path, "" where it is always there."""
     in_path = {near.body_b for line in best.lines for near in line.near}
     for machine in cell.equipment:
@@ -279,7 +279,7 @@ def _door(best: Exit, cell: Cell) -> str:
     return ""
 
 
-def _by(best: Exit, found: Sequence[Visit]) -> str:
+def _by(best: SuggestedExit, found: Sequence[StationVisit]) -> str:
     """By how much, and where to: the shortest that parts the worst pair, "" where that is not
     known.
     """
@@ -295,7 +295,7 @@ def _by(best: Exit, found: Sequence[Visit]) -> str:
     return " by ({}) m in the world".format(", ".join(f"{each + 0.0:.3f}" for each in step))
 
 
-def _with_zone(cell: Cell, name: str, best: Exit) -> Cell:
+def _with_zone(cell: Cell, name: str, best: SuggestedExit) -> Cell:
     """The cell whose zone holds the places where contacts are needed."""
     machine = cell.machine(cell.station(name).equipment)
     places = np.concatenate([line.within for line in best.lines])

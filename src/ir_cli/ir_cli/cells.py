@@ -26,8 +26,8 @@ from ir_cli.output import (
 from ir_cli.planning import add_cell
 from ir_description import (
     Cell,
+    CellFinding,
     DescriptionFileError,
-    Finding,
     RobotCells,
     UnknownNameError,
     bundled_cells,
@@ -94,14 +94,14 @@ class _Looked:
         """Whether a station is looked at: others are left to the robots that visit them."""
         return self.several is None or station in self.several.stations_of(self.robot)
 
-    def findings(self) -> tuple[Finding, ...]:
+    def findings(self) -> tuple[CellFinding, ...]:
         """What looks wrong."""
         if self.several is None:
             return check_cell(self.cell)
         return (*check_robot_cell(self.several, self.robot), *_refused(self.several, self.robot))
 
 
-def _refused(several: RobotCells, robot: str) -> Iterator[Finding]:
+def _refused(several: RobotCells, robot: str) -> Iterator[CellFinding]:
     """Why a robot's program can't be planned together with the others'."""
     from ir_planner import RequestError
     from ir_planner.robots import check_places, check_processes, check_repeatable
@@ -111,14 +111,14 @@ def _refused(several: RobotCells, robot: str) -> Iterator[Finding]:
         check_processes(several.by_name)
         check_places(several)
     except RequestError as error:
-        yield Finding("error", robot, str(error))
+        yield CellFinding("error", robot, str(error))
 
 
 @dataclass(frozen=True, eq=False)
 class _Checked:
     cell: Cell
     stations: list[Row]
-    findings: list[Finding]
+    findings: list[CellFinding]
     suggestions: list[Suggestion]
     configurations: list[Row]
 
@@ -129,7 +129,7 @@ class _Checked:
         return reached and all(each.severity != "error" for each in self.remarks)
 
     @property
-    def remarks(self) -> list[Finding | Suggestion]:
+    def remarks(self) -> list[CellFinding | Suggestion]:
         """What is said below the tables."""
         return [*self.findings, *self.suggestions]
 
@@ -263,7 +263,7 @@ def _print_cell(cell: Cell) -> None:
         sys.stdout.write(table(["equipment", "zone", "bodies", "state"], rows) + "\n")
 
 
-def _print_finding(finding: Finding | Suggestion, file: str) -> None:
+def _print_finding(finding: CellFinding | Suggestion, file: str) -> None:
     """One line, with the place in the file, and what to paste there."""
     line = cell_file_line(file, finding.subject) if is_path(file) else 0
     place = f"{file}:{line}: " if line else ""

@@ -33,10 +33,10 @@ from ir_description import (
     power_parameters_to_yaml,
 )
 from ir_recorder import analyse, read_recording
-from ir_recorder.analysis.indirect import Agreement, Measured, agreement, agreement_of
+from ir_recorder.analysis.indirect import Agreement, MeasuredEnergies, agreement, agreement_of
 from ir_recorder.fit import (
     BY,
-    Source,
+    DataSource,
     doubts,
     fit_data,
     fit_sources,
@@ -244,7 +244,7 @@ def _by_traces(arguments: argparse.Namespace) -> tuple[Agreement, tuple[str, ...
         prior,
         pinocchio_torques,
     )
-    rows: list[Measured] = []
+    rows: list[MeasuredEnergies] = []
     for name, samples in zip(data.names, data.recordings, strict=True):
         predicted = samples.metered(model.watts(prior.mean, model.prepare(samples)))
         other = np.full(len(samples), np.nan)
@@ -252,7 +252,7 @@ def _by_traces(arguments: argparse.Namespace) -> tuple[Agreement, tuple[str, ...
             other = samples.metered(second.watts(prior.mean, second.prepare(samples)))
         joules = samples.step * np.column_stack([samples.watts, predicted, other])
         rows += [
-            Measured(
+            MeasuredEnergies(
                 f"{name} {number}",
                 samples.step * (behind - begin),
                 direct=float(joules[begin:behind, 0].sum()),
@@ -265,7 +265,7 @@ def _by_traces(arguments: argparse.Namespace) -> tuple[Agreement, tuple[str, ...
     return agreement_of(tuple(rows)), data.notes
 
 
-def _asked(arguments: argparse.Namespace) -> tuple[list[Source], PowerParameters]:
+def _asked(arguments: argparse.Namespace) -> tuple[list[DataSource], PowerParameters]:
     """What was recorded, and the parameters to begin with."""
     with sentences():
         cell = load_cell(arguments.cell) if arguments.cell else None
@@ -277,7 +277,7 @@ def _asked(arguments: argparse.Namespace) -> tuple[list[Source], PowerParameters
             f"--meter is there {len(meters)} times, there are {len(arguments.motion)} recordings"
         )
     sources = [
-        Source(
+        DataSource(
             path,
             beside,
             read_mapping(motion) if motion else None,

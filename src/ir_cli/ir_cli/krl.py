@@ -43,7 +43,7 @@ from ir_krl import (
     FrameNumbers,
     Note,
     PlcPause,
-    Source,
+    SourceFile,
     frame_numbers,
     parse,
     plc_input,
@@ -161,7 +161,7 @@ def followed(files: Sequence[Path], planner: Planner, arguments: argparse.Namesp
     return found
 
 
-def _sources(files: Sequence[Path], routine: str) -> tuple[Sequence[Source], Sequence[Note]]:
+def _sources(files: Sequence[Path], routine: str) -> tuple[Sequence[SourceFile], Sequence[Note]]:
     """What the files hold: a project, or modules, each .src with the .dat that lies beside it."""
     if len(files) == 1 and is_project(files[0]):
         project = read_project(files[0])
@@ -185,7 +185,7 @@ def data_beside(source: Path) -> Path | None:
     return next((one for one in found if one.suffix.lower() == ".dat" and one.is_file()), None)
 
 
-def _setting(text: str) -> Source:
+def _setting(text: str) -> SourceFile:
     if "=" in text:
         return settings_of([text])
     return settings_of(_text(Path(text)).splitlines(), text)

@@ -203,10 +203,10 @@ def _record(
     options: PlanOptions,
 ) -> Path:
     """Write the recording; only here ROS is imported."""
-    from ir_cli.ros.plan_recording import ProgramRequest, write_plan
+    from ir_cli.ros.plan_recording import RecordedRequest, write_plan
 
     stations = tuple(arguments.stations)
-    request = ProgramRequest(stations, arguments.cycle_time, options, arguments.saving)
+    request = RecordedRequest(stations, arguments.cycle_time, options, arguments.saving)
     return write_plan(file, plan, request, planner, ANYWHERE)
 
 

@@ -47,7 +47,7 @@ Joules = Callable[[JointTrajectory], float]
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredMotion:
     """A motion from positions alone: its bandwidth [Hz], the rate [Hz] and the noise [rad] (one
     standard deviation, worst joint) of the positions, the joules that the noise adds, and the bound
     [J] within which the energy holds. notes: what was left out of the file or assumed of it.
@@ -110,7 +110,7 @@ def measured(
     joules: Joules,
     bandwidth: float = 0.0,
     progress: Progress = nobody,
-) -> Measured:
+) -> MeasuredMotion:
     """The motion of positions (N, n) at time (N,) [s] with the bandwidth [Hz] (0: the best of
     several) that leaves least open of its energy. InputError for too few or too many rows.
     """
@@ -161,7 +161,7 @@ def _worth(
     positions: FloatArray,
     joules: Joules,
     bandwidth: float,
-) -> Measured:
+) -> MeasuredMotion:
     """The smoothed motion, and the experiment that says what its energy is worth."""
     motion = smoothed(names, time, positions, bandwidth)
     seen = motion.sample(np.clip(time, motion.times[0], motion.duration)).q
@@ -178,7 +178,7 @@ def _worth(
     share = _LEAST + (_COARSE_SHARE if period > _COARSE else 0.0)
     bound = added + 2.0 * float(np.std(noisy)) + _LOST * abs(again - once) + share * abs(once)
     used = min(bandwidth, 0.5 / (_ROWS_PER_KNOT * period))  # as fine as the rows allow
-    return Measured(motion, used, 1.0 / period, float(noise.max()), added, bound)
+    return MeasuredMotion(motion, used, 1.0 / period, float(noise.max()), added, bound)
 
 
 def _noise(time: FloatArray, positions: FloatArray, seen: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_cli.output import Columns, Row, number, text
-from ir_description import AllowedContact, Cell, Finding, Station
+from ir_description import AllowedContact, Cell, CellFinding, Station
 from ir_planner.configurations import free_configurations, no_configuration
 from ir_planner.program.steps import Route, Scenes, placed_steps
 from ir_planner.scene import PlanningScene, tcp_inside
@@ -28,7 +28,7 @@ _ABOUT = 0.02  # rad about machine home
 
 
 @dataclass(frozen=True, eq=False)
-class Visit:
+class StationVisit:
     """A station with what is held there, where the parts lie and how the doors stand."""
 
     station: Station
@@ -42,7 +42,7 @@ class Visit:
         )
 
 
-def visits(cell: Cell) -> Iterator[Visit]:
+def visits(cell: Cell) -> Iterator[StationVisit]:
     """Every station as the program finds it when it arrives and when it leaves; as it is before the
     program where that does not go. Each situation once.
     """
@@ -55,10 +55,10 @@ def visits(cell: Cell) -> Iterator[Visit]:
     start = scenes.of(cell.parts_at_start())
     for name, situations in found.items():
         once = {id(scene): scene for scene in situations or [start]}
-        yield from (Visit(cell.station(name), scene) for scene in once.values())
+        yield from (StationVisit(cell.station(name), scene) for scene in once.values())
 
 
-def heavy_loads(cell: Cell) -> Iterator[Finding]:
+def heavy_loads(cell: Cell) -> Iterator[CellFinding]:
     """Loads that need more of a joint's torque, moved slowly about machine home, than the default
     reserve leaves, or than there is.
     """
@@ -71,14 +71,14 @@ def heavy_loads(cell: Cell) -> Iterator[Finding]:
     for scene in scenes:
         need = need_of([(here - _ABOUT, here + _ABOUT)], scene)
         if need >= 1.0:
-            yield Finding(
+            yield CellFinding(
                 "error",
                 scene.load_text,
                 f"needs {need:.2f} times the torque of a joint to be moved slowly at machine home: "
                 "it must be below 1",
             )
         elif need > 1.0 - reserve:
-            yield Finding(
+            yield CellFinding(
                 "warning",
                 scene.load_text,
                 f"needs {need:.3f} of the torque of a joint to be moved slowly at machine home: "
@@ -87,7 +87,7 @@ def heavy_loads(cell: Cell) -> Iterator[Finding]:
             )
 
 
-def reaching(visit: Visit) -> FloatArray:
+def reaching(visit: StationVisit) -> FloatArray:
     """Configurations (K, n) that reach a station, free or not, those that differ by whole turns
     once: the one nearest to machine home.
     """
@@ -107,7 +107,7 @@ def stations_of(cell: Cell) -> list[Row]:
     return [_row(visit, cell) for visit in visits(cell)]
 
 
-def _row(visit: Visit, cell: Cell) -> Row:
+def _row(visit: StationVisit, cell: Cell) -> Row:
     station = visit.station
     scene = visit.scene
     threshold = scene.thresholds(MARGIN, station.name)
@@ -186,7 +186,7 @@ class AccessLine:
         return "" if self.whole else f"the joint limits end it after {1e3 * self.reach:.0f} mm"
 
 
-def lines_of(visit: Visit, approach: float) -> list[AccessLine]:
+def lines_of(visit: StationVisit, approach: float) -> list[AccessLine]:
     """The line of every configuration that reaches the station, with an approach distance [m]."""
     station = replace(visit.station, approach_distance=approach)
     scene = visit.scene
@@ -269,7 +269,7 @@ def configurations_of(cell: Cell) -> list[Row]:
     return [row for visit in visits(cell) for row in _rows(visit)]
 
 
-def _rows(visit: Visit) -> Iterator[Row]:
+def _rows(visit: StationVisit) -> Iterator[Row]:
     distance = visit.station.approach_distance
     there = lines_of(visit, 0.0)
     out = lines_of(visit, distance)

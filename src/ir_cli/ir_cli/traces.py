@@ -19,7 +19,7 @@ import numpy as np
 
 from ir_cli.errors import InputError
 from ir_cli.output import Row
-from ir_cli.smoothing import BANDWIDTHS, Measured, measured, smoothed
+from ir_cli.smoothing import BANDWIDTHS, MeasuredMotion, measured, smoothed
 from ir_description import RobotModel
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner
@@ -313,7 +313,7 @@ def add_measured(parser: argparse.ArgumentParser) -> None:
 
 def motion_of(
     arguments: argparse.Namespace, planner: Planner, progress: Progress, path: Path | None = None
-) -> tuple[Measured | None, JointTrajectory]:
+) -> tuple[MeasuredMotion | None, JointTrajectory]:
     """The motion of a trace, and what is known of it where it was smoothed."""
     robot = planner.cell.robot
     file = path or arguments.trace
@@ -351,7 +351,7 @@ def between(file: Path, found: JointTrajectory | Rows, begin: float, end: float)
     return Rows(time - time[0], found.positions[inside], found.notes)
 
 
-def measured_figures(known: Measured | None) -> Row:
+def measured_figures(known: MeasuredMotion | None) -> Row:
     """The same for other programs."""
     if known is None:
         return {}

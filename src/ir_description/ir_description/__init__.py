@@ -30,7 +30,7 @@ from ir_description.cell import (
     machine_in,
     sweep_speeds,
 )
-from ir_description.cell_review import Finding, check_cell, check_robot_cell
+from ir_description.cell_review import CellFinding, check_cell, check_robot_cell
 from ir_description.files import (
     cell_hash,
     cell_to_yaml,
@@ -126,6 +126,7 @@ __all__ = [
     "Capsule",
     "Cell",
     "CellFileError",
+    "CellFinding",
     "CellPath",
     "CellSignal",
     "Counterbalance",
@@ -133,7 +134,6 @@ __all__ = [
     "DescriptionFileError",
     "Equipment",
     "EquipmentState",
-    "Finding",
     "FramePose",
     "InvalidValueError",
     "Load",

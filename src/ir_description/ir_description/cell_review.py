@@ -29,7 +29,7 @@ _FAR = 10.0  # times the reach: a place farther away is rather one in mm
 
 
 @dataclass(frozen=True)
-class Finding:
+class CellFinding:
     """An error will keep the program from running; a warning may be meant."""
 
     severity: Literal["error", "warning"]
@@ -37,7 +37,7 @@ class Finding:
     sentence: str
 
 
-def check_cell(cell: Cell, power: PowerData | None = None) -> tuple[Finding, ...]:
+def check_cell(cell: Cell, power: PowerData | None = None) -> tuple[CellFinding, ...]:
     """Return what looks wrong in a cell, errors first. power: the modes; None: the robot's own."""
     findings = [
         *_base(cell),
@@ -56,7 +56,7 @@ def check_cell(cell: Cell, power: PowerData | None = None) -> tuple[Finding, ...
 
 def check_robot_cell(
     cells: RobotCells, robot: str, power: PowerData | None = None
-) -> tuple[Finding, ...]:
+) -> tuple[CellFinding, ...]:
     """Return the same of the cell of one of several robots: stations that concern another robot
     alone are left to that one, and feet may look as they do.
     """
@@ -72,7 +72,7 @@ def check_robot_cell(
     )
 
 
-def _sizes(cell: Cell) -> Iterator[Finding]:
+def _sizes(cell: Cell) -> Iterator[CellFinding]:
     """Lengths that were meant in mm."""
     for body in cell.bodies():
         longest = float(body.size.max(initial=0.0)) if body.kind != "plane" else 0.0
@@ -80,10 +80,10 @@ def _sizes(cell: Cell) -> Iterator[Finding]:
             sentence = (
                 f"is {longest:g} m long; lengths are in m: {longest / 1000.0:g} for {longest:g} mm?"
             )
-            yield Finding("warning", body.name, sentence)
+            yield CellFinding("warning", body.name, sentence)
 
 
-def _angles(cell: Cell) -> Iterator[Finding]:
+def _angles(cell: Cell) -> Iterator[CellFinding]:
     """Angles that were meant in radians: a right angle is usual, 1.57 degrees is not."""
     for subject, angles in _angles_deg(cell):
         turns = np.round(angles / _RIGHT)
@@ -92,7 +92,7 @@ def _angles(cell: Cell) -> Iterator[Finding]:
             k = int(np.argmax(right))
             meant = f"{90.0 * turns[k]:g} for {angles[k]:.6g} rad"
             sentence = f"is turned by {angles[k]:.6g} degrees; angles are in degrees: {meant}?"
-            yield Finding("warning", subject, sentence)
+            yield CellFinding("warning", subject, sentence)
 
 
 def _angles_deg(cell: Cell) -> Iterator[tuple[str, FloatArray]]:
@@ -114,7 +114,7 @@ def _first_of_pose(bodies: Iterable[Body]) -> Iterable[Body]:
     return {body.pose.tobytes(): body for body in reversed([*bodies])}.values()
 
 
-def _sunk(cell: Cell) -> Iterator[Finding]:
+def _sunk(cell: Cell) -> Iterator[CellFinding]:
     """Bodies whose middle was meant to be their underside."""
     for body in cell.bodies() if cell.floor else ():
         below = 0.0 if body.kind == "plane" else -float(body.bounds()[0][2])
@@ -123,10 +123,10 @@ def _sunk(cell: Cell) -> Iterator[Finding]:
                 f"reaches {below:.3f} m below the floor; xyz is the middle of a body, not "
                 "its underside"
             )
-            yield Finding("warning", body.name, sentence)
+            yield CellFinding("warning", body.name, sentence)
 
 
-def _base(cell: Cell) -> Iterator[Finding]:
+def _base(cell: Cell) -> Iterator[CellFinding]:
     """Capsules of base_link never move: what they touch, they touch for good."""
     ignored = set(cell.ignored_pairs)
     bodies = cell.bodies()
@@ -140,7 +140,7 @@ def _base(cell: Cell) -> Iterator[Finding]:
             continue
         distance = capsule_distance(body, capsule)
         if distance <= 0.0:
-            yield Finding(
+            yield CellFinding(
                 "error",
                 body.name,
                 f"stands in the robot's {capsule.name} ({distance:.3f} m); move it, or write "
@@ -154,7 +154,7 @@ def _capsule_bounds(capsule: Capsule) -> tuple[FloatArray, FloatArray]:
     return ends.min(axis=0) - capsule.radius, ends.max(axis=0) + capsule.radius
 
 
-def _stations(cell: Cell) -> Iterator[Finding]:
+def _stations(cell: Cell) -> Iterator[CellFinding]:
     shoulder = cell.base_pose @ cell.robot.joint_origin[0]
     reach = _reach(cell)
     machines = {machine.name: machine for machine in cell.equipment}
@@ -164,19 +164,21 @@ def _stations(cell: Cell) -> Iterator[Finding]:
         for body in bodies:
             depth = point_distance(body, point)
             if depth < 0.0:
-                yield Finding(
+                yield CellFinding(
                     "error", station.name, f"its tcp is {-depth:.3f} m inside {body.name}"
                 )
         distance = float(np.linalg.norm(point - shoulder[:3, 3]))
         if distance > reach:
             unit = "; lengths are in m, not in mm" if distance > _FAR * reach else ""
             sentence = f"its tcp is {distance:.3f} m from A1, the arm reaches {reach:.3f} m{unit}"
-            yield Finding("error", station.name, sentence)
+            yield CellFinding("error", station.name, sentence)
         machine = machines[station.equipment]
         if not machine.enabled:
-            yield Finding("warning", station.name, f"its machine {machine.name} is switched off")
+            yield CellFinding(
+                "warning", station.name, f"its machine {machine.name} is switched off"
+            )
         if station.allowed_contacts and not _inside(machine.zone, point):
-            yield Finding(
+            yield CellFinding(
                 "warning",
                 station.name,
                 f"its tcp is outside the zone of {machine.name}; only inside do its allowed "
@@ -206,7 +208,7 @@ def _inside(zone: Zone, point: FloatArray) -> bool:
     return bool((np.abs(local) <= zone.size / 2.0).all())
 
 
-def _zones(cell: Cell) -> Iterator[Finding]:
+def _zones(cell: Cell) -> Iterator[CellFinding]:
     """Where zones overlap, one machine obstructs the withdrawal from the other, if there are
     stations.
     """
@@ -222,7 +224,9 @@ def _zones(cell: Cell) -> Iterator[Finding]:
         and _boxes_overlap(zones[i], zones[j])
     )
     for i, j in itertools.islice(pairs, OVERLAPS_MAX):
-        yield Finding("warning", machines[i].name, f"its zone overlaps that of {machines[j].name}")
+        yield CellFinding(
+            "warning", machines[i].name, f"its zone overlaps that of {machines[j].name}"
+        )
 
 
 def _zone_bounds(zone: Zone) -> tuple[FloatArray, FloatArray]:
@@ -247,7 +251,7 @@ def _boxes_overlap(first: Zone, second: Zone) -> bool:
     return True
 
 
-def _signals(cell: Cell) -> Iterator[Finding]:
+def _signals(cell: Cell) -> Iterator[CellFinding]:
     answered = {signal.name: signal for signal in cell.signals}
     set_somewhere = {
         (signal.name, signal.value) for step in cell.program for signal in step.set_signals
@@ -259,14 +263,14 @@ def _signals(cell: Cell) -> Iterator[Finding]:
                 continue
             if (source.follows, signal.value) in set_somewhere:
                 continue
-            yield Finding(
+            yield CellFinding(
                 "warning",
                 signal.name,
                 f"step {k} waits for {signal.text}, which nothing in the cell brings about",
             )
 
 
-def _pauses(cell: Cell, power: PowerData) -> Iterator[Finding]:
+def _pauses(cell: Cell, power: PowerData) -> Iterator[CellFinding]:
     for k, step in enumerate(cell.program, start=1):
         if step.kind != "PAUSE" or step.power_mode == AUTO:
             continue
@@ -274,11 +278,11 @@ def _pauses(cell: Cell, power: PowerData) -> Iterator[Finding]:
             sentence = (
                 f"asks for {step.power_mode}, which the controller {power.name} does not have"
             )
-            yield Finding("error", f"step {k}", sentence)
+            yield CellFinding("error", f"step {k}", sentence)
             continue
         mode = power.mode(step.power_mode)
         if step.dwell < mode.time_min_pause:
-            yield Finding(
+            yield CellFinding(
                 "warning",
                 f"step {k}",
                 f"the pause is {step.dwell:g} s, {mode.name} needs at least "
@@ -286,16 +290,16 @@ def _pauses(cell: Cell, power: PowerData) -> Iterator[Finding]:
             )
 
 
-def _parts(cell: Cell) -> Iterator[Finding]:
+def _parts(cell: Cell) -> Iterator[CellFinding]:
     state = cell.parts_at_start()
     for step in cell.program:
         state = state.after(step)
     if state.held:
-        yield Finding("warning", state.held, "is still held when the program ends")
+        yield CellFinding("warning", state.held, "is still held when the program ends")
 
 
-def _processes(cell: Cell) -> Iterator[Finding]:
+def _processes(cell: Cell) -> Iterator[CellFinding]:
     for machine in cell.equipment if cell.route is None else ():
         if machine.process > 0.0:
             sentence = f"has a process of {machine.process:g} s, but the cell has no route"
-            yield Finding("warning", machine.name, sentence)
+            yield CellFinding("warning", machine.name, sentence)

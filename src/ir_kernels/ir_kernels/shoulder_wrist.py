@@ -25,7 +25,7 @@ NEAR_UNIT = 1e-5  # of the length of exp(i q1): two roots at a tangent are known
 _NOTHING = 1e-12  # m, and of a direction: nothing that an angle could change
 
 
-class Pairs(NamedTuple):
+class ShoulderPairs(NamedTuple):
     """q1, q5 (N, 4), which exist (N, 4), and how far beyond a tangent each is (N, 4): 0 where it
     exists.
     """
@@ -72,7 +72,7 @@ def _along(to: FloatArray, axis: FloatArray, vector: FloatArray) -> _Sum:
 
 def shoulder_and_wrist(
     lines: ArmLines, X: FloatArray, E4: FloatArray, slack: float = TOUCH
-) -> Pairs:
+) -> ShoulderPairs:
     """q1 and q5 for displacements (N, 4, 4) of the hand and of axis 4. slack: how far beyond a
     tangent counts as existing, for those who want guesses near solutions of another E4.
     """
@@ -97,7 +97,7 @@ def shoulder_and_wrist(
 
 def _one_by_one(
     q1: FloatArray, reached: BoolArray, far: FloatArray, aim1: _Sum, aim5: _Sum, slack: float
-) -> Pairs:
+) -> ShoulderPairs:
     pairs = []
     for k in (0, 1):
         value = (
@@ -109,10 +109,10 @@ def _one_by_one(
         each = (q1[:, k], reached & aimed, np.maximum(far, off))
         first, exists, beyond = (np.repeat(column[:, None], 2, axis=1) for column in each)
         pairs.append((first, q5, exists, beyond))
-    return Pairs(*(np.concatenate(parts, axis=1) for parts in zip(*pairs, strict=True)))
+    return ShoulderPairs(*(np.concatenate(parts, axis=1) for parts in zip(*pairs, strict=True)))
 
 
-def _together(aim1: _Sum, aim5: _Sum, reach1: _Sum, reach5: _Sum, slack: float) -> Pairs:
+def _together(aim1: _Sum, aim5: _Sum, reach1: _Sum, reach5: _Sum, slack: float) -> ShoulderPairs:
     """M x + m = N y with x, y the unit vectors of q1 and q5: |adj(N) (M x + m)| = |det N|."""
     N = np.stack([aim5[:2], reach5[:2]]).transpose(2, 0, 1)  # (n, 2, 2)
     scale = np.maximum(np.abs(N).max(axis=2), _NOTHING)  # both rows without a unit
@@ -132,7 +132,7 @@ def _together(aim1: _Sum, aim5: _Sum, reach1: _Sum, reach5: _Sum, slack: float) 
     x = np.stack([portable.cos(q1), portable.sin(q1)], axis=1)  # (n, 2, 4)
     y = (portable.matmul(A, x) + a[:, :, None]) * np.sign(det)[:, None, None]
     far = np.where(np.abs(beyond) > NEAR_UNIT, np.abs(beyond), 0.0)
-    return Pairs(q1, portable.arctan2(y[:, 1], y[:, 0]), np.abs(beyond) <= slack, far)
+    return ShoulderPairs(q1, portable.arctan2(y[:, 1], y[:, 0]), np.abs(beyond) <= slack, far)
 
 
 def _unit_roots(A: FloatArray, a: FloatArray, det: FloatArray) -> FloatArray:

@@ -6,11 +6,12 @@
 What the motions mean for a robot among machines is `ir_planner.krl`'s.
 """
 
-from ir_krl.errors import KrlError, KrlMotionError, KrlRunError, Place
-from ir_krl.language import Source, parse
+from ir_krl.errors import KrlError, KrlMotionError, KrlRunError, SourcePlace
+from ir_krl.language import SourceFile, parse
 from ir_krl.project import ARCHIVES, BYTES_MAX, File, Project, read_project, text_of
 from ir_krl.run import (
     FRAME_NAMES,
+    AdvanceStop,
     Blend,
     Command,
     Effect,
@@ -23,13 +24,12 @@ from ir_krl.run import (
     SignalRange,
     Speeds,
     SplineBlock,
-    Stop,
+    StandStill,
     Switch,
     Target,
     TimeBlock,
     UnknownRoutine,
-    Wait,
-    WaitFor,
+    WaitForCondition,
     follow,
     worst_first,
 )
@@ -82,6 +82,7 @@ __all__ = [
     "PLC_THERE",
     "STYLES",
     "URSCRIPT",
+    "AdvanceStop",
     "Attached",
     "Blend",
     "Chosen",
@@ -98,23 +99,22 @@ __all__ = [
     "Note",
     "Numbers",
     "Payload",
-    "Place",
     "PlcPause",
     "Project",
     "SetOutput",
     "SignalRange",
-    "Source",
+    "SourceFile",
+    "SourcePlace",
     "Speeds",
     "SplineBlock",
-    "Stop",
+    "StandStill",
     "Style",
     "Switch",
     "Target",
     "Texts",
     "TimeBlock",
     "UnknownRoutine",
-    "Wait",
-    "WaitFor",
+    "WaitForCondition",
     "WrittenHandling",
     "WrittenMove",
     "WrittenPath",

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Place:
+class SourcePlace:
     """Where something stands: file as the caller named it, line and column from 1; 0 where
     unknown.
     """
@@ -25,8 +25,8 @@ class KrlError(Exception):
     Raised itself for a text that is no KRL, or a construct of KRL that isn't read here.
     """
 
-    def __init__(self, message: str, place: Place | None = None) -> None:
-        self.place = place or Place()
+    def __init__(self, message: str, place: SourcePlace | None = None) -> None:
+        self.place = place or SourcePlace()
         self.reason = message
         super().__init__(f"{self.place}: {message}" if str(self.place) else message)
 

@@ -11,8 +11,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
-from ir_krl.errors import KrlError, Place
-from ir_krl.language import Routine, Source, Tree, parse
+from ir_krl.errors import KrlError, SourcePlace
+from ir_krl.language import Routine, SourceFile, SyntaxTree, parse
 from ir_krl.run.library import CONTROLLERS
 from ir_krl.run.notes import Effect, Note
 from ir_values.files import ANYWHERE
@@ -52,10 +52,13 @@ class File:
 def text_of(content: bytes, name: str) -> str:
     """The text of a file, which `name` names. Raises KrlError."""
     if len(content) > BYTES_MAX:
-        raise KrlError(f"{len(content)} bytes: at most {BYTES_MAX} are read, split it", Place(name))
+        raise KrlError(
+            f"{len(content)} bytes: at most {BYTES_MAX} are read, split it", SourcePlace(name)
+        )
     if content.startswith(_UTF16):
         raise KrlError(
-            "the file is UTF-16 text, must be UTF-8: save it with that encoding", Place(name, 1, 1)
+            "the file is UTF-16 text, must be UTF-8: save it with that encoding",
+            SourcePlace(name, 1, 1),
         )
     return content.decode("utf-8", errors="replace")
 
@@ -68,9 +71,9 @@ class Project:
 
     name: str
     files: tuple[File, ...]
-    _read: dict[PurePosixPath, Source | KrlError] = field(default_factory=dict)
+    _read: dict[PurePosixPath, SourceFile | KrlError] = field(default_factory=dict)
 
-    def source(self, file: File) -> Source | KrlError:
+    def source(self, file: File) -> SourceFile | KrlError:
         """A file as it is read, or why it isn't."""
         if file.path not in self._read:
             try:
@@ -120,15 +123,15 @@ class Project:
 
     def _names(self, file: File) -> list[str]:
         source = self.source(file) if file.path.suffix.lower() != ".dat" else None
-        return [one.name for one in source.routines] if isinstance(source, Source) else []
+        return [one.name for one in source.routines] if isinstance(source, SourceFile) else []
 
     def _calls(self, file: File) -> Iterator[str]:
         source = self.source(file)
-        if isinstance(source, Source):
+        if isinstance(source, SourceFile):
             for routine in source.routines:
                 yield from (name for name in _called(routine) if name != file.module)
 
-    def sources(self, main: File) -> tuple[tuple[Source, ...], tuple[Note, ...]]:
+    def sources(self, main: File) -> tuple[tuple[SourceFile, ...], tuple[Note, ...]]:
         """What the program in `main` is followed with, its own module first, and what is left out
         since it can't be read. Of modules of one name the nearest file counts. Raises KrlError for
         a file of the program's own module.
@@ -141,10 +144,10 @@ class Project:
             taken = names.get((file.module, file.path.suffix.lower()))
             if taken is not None and taken != file.path and file.module not in CONTROLLERS:
                 said = f"{file.path} is left out: {taken} has the same name and is nearer"
-                notes.append(Note(Place(), said, Effect.MOTIONS))
+                notes.append(Note(SourcePlace(), said, Effect.MOTIONS))
         for file in nearest:
             source = self.source(file)
-            if isinstance(source, Source):
+            if isinstance(source, SourceFile):
                 found.append(source)
             elif file.module == main.module:
                 raise source
@@ -231,7 +234,7 @@ def _names_motions(file: File) -> bool:
         return False
 
 
-def _moves(tree: Tree) -> bool:
+def _moves(tree: SyntaxTree) -> bool:
     return any(one.data in _MOTIONS for one in _trees(tree))
 
 
@@ -239,8 +242,8 @@ def _called(routine: Routine) -> Iterable[str]:
     return (str(one.children[0]) for one in _trees(routine.body) if one.data == "call")
 
 
-def _trees(tree: Tree) -> Iterator[Tree]:
+def _trees(tree: SyntaxTree) -> Iterator[SyntaxTree]:
     yield tree
     for child in tree.children:
-        if isinstance(child, Tree):
+        if isinstance(child, SyntaxTree):
             yield from _trees(child)

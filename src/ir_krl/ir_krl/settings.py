@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from ir_krl.errors import KrlError
-from ir_krl.language import Source, parse
+from ir_krl.language import SourceFile, parse
 from ir_krl.run import UnknownRoutine
 
 SETTINGS = "--set"
 
 
-def settings_of(lines: Iterable[str], name: str = SETTINGS) -> Source:
+def settings_of(lines: Iterable[str], name: str = SETTINGS) -> SourceFile:
     """Lines NAME=VALUE as a data list; `name` is the file that complaints carry. Raises KrlError
     for a line that is none.
     """

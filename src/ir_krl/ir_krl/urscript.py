@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ir_description.poses import abc_from_rotation, pose_of
-from ir_krl.errors import KrlError, KrlRunError, Place
+from ir_krl.errors import KrlError, KrlRunError, SourcePlace
 from ir_krl.run.commands import (
     END_OF_LAST,
     Blend,
@@ -25,9 +25,9 @@ from ir_krl.run.commands import (
     Payload,
     SetOutput,
     Speeds,
+    StandStill,
     Target,
-    Wait,
-    WaitFor,
+    WaitForCondition,
 )
 from ir_krl.run.notes import Effect, Note, worst_first
 from ir_krl.run.program import Followed
@@ -137,7 +137,7 @@ class _Script:
         self._commands: list[Command] = []
         self._notes: list[Note] = []
         self._name = "PROGRAM"
-        self._calls: Mapping[str, Callable[[ast.Call, Place], None]] = {
+        self._calls: Mapping[str, Callable[[ast.Call, SourcePlace], None]] = {
             "movej": self._movej,
             "movel": self._movel,
             "set_tcp": self._set_tcp,
@@ -152,7 +152,7 @@ class _Script:
         waiting = False
         for number, line in enumerate(self._lines, start=1):
             text = line.split("#", 1)[0].strip()
-            place = Place(self._file, number, 1)
+            place = SourcePlace(self._file, number, 1)
             if not text:
                 continue
             if waiting and text != "end":
@@ -162,7 +162,7 @@ class _Script:
             if match := _WAIT.fullmatch(text):
                 until = bool(match[1]) or match[3] == "False"
                 condition = f"{'' if until else 'NOT '}$IN[{int(match[2]) + 1}]"
-                self._commands.append(WaitFor(condition, place))
+                self._commands.append(WaitForCondition(condition, place))
                 waiting = True
                 continue
             if text == "end":
@@ -171,7 +171,7 @@ class _Script:
             self._statement(text, place)
         return Followed(self._name, tuple(self._commands), worst_first(self._notes))
 
-    def _statement(self, text: str, place: Place) -> None:
+    def _statement(self, text: str, place: SourcePlace) -> None:
         if match := re.fullmatch(r"def\s+(\w+)\(\):", text):
             self._name = match[1].upper()
             return
@@ -202,13 +202,13 @@ class _Script:
                 Note(place, f"{name} isn't known: no motion assumed", Effect.MOTIONS)
             )
 
-    def _parsed(self, text: str, place: Place) -> ast.expr:
+    def _parsed(self, text: str, place: SourcePlace) -> ast.expr:
         try:
             return ast.parse(text, mode="eval").body
         except (SyntaxError, ValueError, RecursionError):
             raise KrlError(f"{text[:40]!r} isn't URScript", place) from None
 
-    def _value(self, node: ast.expr, place: Place) -> object:  # noqa: PLR0911
+    def _value(self, node: ast.expr, place: SourcePlace) -> object:  # noqa: PLR0911
         match node:
             case ast.Constant(value=bool() | int() | float() as value):
                 return value
@@ -232,7 +232,7 @@ class _Script:
                 return math.degrees(self._number(inner, place))
         raise KrlRunError(f"{ast.unparse(node)[:40]!r} has no value here", place)
 
-    def _number(self, node: ast.expr, place: Place) -> float:
+    def _number(self, node: ast.expr, place: SourcePlace) -> float:
         value = self._value(node, place)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise KrlRunError(f"{ast.unparse(node)[:40]!r} must be a number", place)
@@ -240,7 +240,9 @@ class _Script:
             raise KrlRunError(f"{ast.unparse(node)[:40]!r} must be finite", place)
         return float(value)
 
-    def _given(self, call: ast.Call, names: Sequence[str], place: Place) -> dict[str, ast.expr]:
+    def _given(
+        self, call: ast.Call, names: Sequence[str], place: SourcePlace
+    ) -> dict[str, ast.expr]:
         given = dict(zip(names, call.args, strict=False))
         given |= {str(one.arg): one.value for one in call.keywords}
         unknown = next((name for name in given if name not in names), None)
@@ -249,7 +251,7 @@ class _Script:
         return given
 
     def _move(
-        self, call: ast.Call, kind: Kind, usual: tuple[float, float], place: Place
+        self, call: ast.Call, kind: Kind, usual: tuple[float, float], place: SourcePlace
     ) -> tuple[Target, float, float, Blend | None]:
         given = self._given(call, ("q", "a", "v", "t", "r"), place)
         given |= {"q": given["pose"]} if "pose" in given else {}
@@ -267,7 +269,7 @@ class _Script:
         target = self._target(self._value(given["q"], place), kind, place)
         return target, numbers["a"], numbers["v"], blend
 
-    def _target(self, value: object, kind: Kind, place: Place) -> Target:
+    def _target(self, value: object, kind: Kind, place: SourcePlace) -> Target:
         count = len(AXIS_NAMES)
         common = (None, None, False, False, np.eye(4), self._tool)
         if isinstance(value, tuple) and len(value) == count and kind == "ptp":
@@ -280,7 +282,7 @@ class _Script:
         wanted = "six joint values or a pose p[...]" if kind == "ptp" else "a pose p[...]"
         raise KrlRunError(f"a move goes to {wanted}", place)
 
-    def _movej(self, call: ast.Call, place: Place) -> None:
+    def _movej(self, call: ast.Call, place: SourcePlace) -> None:
         target, a, v, blend = self._move(call, "ptp", (1.4, 1.05), place)
         speeds = Speeds(
             tuple(np.minimum(v / self._limits.velocity, 1.0).tolist()),
@@ -293,7 +295,7 @@ class _Script:
         )
         self._commands.append(Motion("ptp", target, speeds, place, blend, payload=self._payload))
 
-    def _movel(self, call: ast.Call, place: Place) -> None:
+    def _movel(self, call: ast.Call, place: SourcePlace) -> None:
         target, a, v, blend = self._move(call, "lin", (1.2, 0.25), place)
         if not any(note.text == _TURNS for note in self._notes):
             self._notes.append(Note(place, _TURNS, Effect.SPEEDS))
@@ -301,14 +303,14 @@ class _Script:
         speeds = Speeds(full, full, v, a, _TURNING, _TURNING, 1.0)
         self._commands.append(Motion("lin", target, speeds, place, blend, payload=self._payload))
 
-    def _set_tcp(self, call: ast.Call, place: Place) -> None:
+    def _set_tcp(self, call: ast.Call, place: SourcePlace) -> None:
         value = self._value(call.args[0], place) if call.args else None
         if not isinstance(value, _Pose) or len(value.values) != 6:
             raise KrlRunError("set_tcp takes a pose p[...]", place)
         turn = rotation_from_vector(np.array(value.values[3:]))
         self._tool = _turned(pose_of(value.values[:3], turn), 1.0)
 
-    def _set_payload(self, call: ast.Call, place: Place) -> None:
+    def _set_payload(self, call: ast.Call, place: SourcePlace) -> None:
         given = self._given(call, ("m", "cog", "inertia"), place)
         if "m" not in given:
             raise KrlRunError("a payload needs its mass", place)
@@ -323,14 +325,14 @@ class _Script:
         about = (float(moments[0]), float(moments[1]), float(moments[2]))
         self._payload = Payload(self._number(given["m"], place), (x, y, z), turned, about)
 
-    def _sleep(self, call: ast.Call, place: Place) -> None:
+    def _sleep(self, call: ast.Call, place: SourcePlace) -> None:
         seconds = self._number(call.args[0], place) if call.args else 0.0
         if not 0.0 <= seconds <= 604_800.0:
             raise KrlRunError(f"sleep({seconds:g}): it must be in 0 .. 604800 s", place)
         if seconds > 0.0:
-            self._commands.append(Wait(seconds, place))
+            self._commands.append(StandStill(seconds, place))
 
-    def _output(self, call: ast.Call, place: Place) -> None:
+    def _output(self, call: ast.Call, place: SourcePlace) -> None:
         values = [self._value(one, place) for one in call.args]
         if len(values) != 2 or not isinstance(values[1], bool):
             raise KrlRunError("an output takes its number and True or False", place)

@@ -39,7 +39,7 @@ from ir_msgs_py.report import (
     TrajectoryReport,
 )
 from ir_msgs_py.status import Status, StatusCode
-from ir_msgs_py.trajectory import JointTrajectory, Samples
+from ir_msgs_py.trajectory import JointTrajectory, MotionSamples
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 from ir_values.errors import (
     CallTimedOutError,
@@ -77,6 +77,7 @@ __all__ = [
     "JointTrajectory",
     "Mode",
     "ModeRow",
+    "MotionSamples",
     "MovementKind",
     "OperatingMode",
     "PairKind",
@@ -93,7 +94,6 @@ __all__ = [
     "ProgramState",
     "Rejection",
     "RequestRefusedError",
-    "Samples",
     "ServiceCandidate",
     "ServiceUnavailableError",
     "Setting",

@@ -87,7 +87,7 @@ class ProgramPoint:
 
 
 @dataclass(frozen=True)
-class Hop:
+class HopSaving:
     """All movements from one stop to the next, or one pause: seconds, and energy [J] at the mains
     with its 90 % interval.
     """
@@ -117,7 +117,7 @@ class Side:
     cycle_time: float
     movements: tuple[PlannedMovement, ...] = ()
     report: TrajectoryReport = field(default_factory=TrajectoryReport)
-    hops: tuple[Hop, ...] = ()
+    hops: tuple[HopSaving, ...] = ()
     time: FloatArray = field(default_factory=lambda: np.zeros(0))
     watts: FloatArray = field(default_factory=lambda: np.zeros(0))
     high: FloatArray = field(default_factory=lambda: np.zeros(0))
@@ -143,7 +143,7 @@ class Side:
 
 
 @dataclass(frozen=True)
-class Change:
+class StepChange:
     """One movement or pause, as it is today and as it is planned: what is to be done, and what that
     saves.
 
@@ -171,7 +171,7 @@ class BeforeAfter:
     today: Side
     sides: tuple[Side, ...]
     towards: str
-    changes: tuple[Change, ...]
+    changes: tuple[StepChange, ...]
     notes: tuple[str, ...] = ()
 
     @property

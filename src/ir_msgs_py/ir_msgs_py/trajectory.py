@@ -73,7 +73,7 @@ _JOINED = 1e-6  # rad between two motions that are one
 _MAX_TIME_NS = 2**31 * NS_PER_S  # what builtin_interfaces/Duration holds
 
 
-class Samples(NamedTuple):
+class MotionSamples(NamedTuple):
     """Motion at M instants, each (M, n): rad, rad/s, rad/s^2, rad/s^3."""
 
     q: FloatArray
@@ -180,7 +180,7 @@ class JointTrajectory:
         """
         return self._polynomials
 
-    def sample(self, t: ArrayLike) -> Samples:
+    def sample(self, t: ArrayLike) -> MotionSamples:
         """Motion at times t (M,) from start [s]; the robot rests before the first point and after
         the last.
 
@@ -193,10 +193,10 @@ class JointTrajectory:
         times = self.times
         if len(durations) == 0:
             rest = np.zeros((len(instants), len(self.joint_names)))
-            return Samples(np.repeat(self.positions, len(instants), axis=0), rest, rest, rest)
+            return MotionSamples(np.repeat(self.positions, len(instants), axis=0), rest, rest, rest)
         segment = np.clip(np.searchsorted(times, instants, side="right") - 1, 0, len(durations) - 1)
         local = np.clip(instants - times[segment], 0.0, durations[segment])
-        samples = Samples(*evaluate(self._powers.take(segment, axis=1), local))
+        samples = MotionSamples(*evaluate(self._powers.take(segment, axis=1), local))
         outside = (instants < times[0]) | (instants > times[-1])
         for derivative in samples[1:]:
             derivative[outside] = 0.0
@@ -253,12 +253,12 @@ class JointTrajectory:
         return JointTrajectory(self.joint_names, times, positions, velocities, accelerations)
 
     @property
-    def last(self) -> Samples:
+    def last(self) -> MotionSamples:
         """Motion (1, n) at the last point, as its values say; what they don't say is 0."""
         still = np.zeros_like(self.positions[-1:])
         velocity = still if self.velocities is None else self.velocities[-1:]
         acceleration = still if self.accelerations is None else self.accelerations[-1:]
-        return Samples(self.positions[-1:], velocity, acceleration, still)
+        return MotionSamples(self.positions[-1:], velocity, acceleration, still)
 
     def then(self, following: JointTrajectory) -> JointTrajectory:
         """This motion and, from its last point on, the one that begins there. Raises

@@ -16,7 +16,7 @@ from ir_values.errors import InvalidValueError
 MOST_SIGNALS = 10_000  # a cell has tens; who invents names must not fill the memory
 
 
-class CellSignal(Protocol):
+class MachineSignal(Protocol):
     """A signal as a cell describes it; `follows` names the signal that it follows, or is empty."""
 
     @property
@@ -75,7 +75,7 @@ class Machines:
 
     def __init__(
         self,
-        signals: Iterable[CellSignal] = (),
+        signals: Iterable[MachineSignal] = (),
         times: Mapping[str, ProcessTimes] | None = None,
         seed: int = 0,
     ) -> None:

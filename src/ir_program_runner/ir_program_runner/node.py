@@ -41,7 +41,7 @@ from ir_program_runner.program import (
     MOST_STEPS,
     Program,
     ProgramResult,
-    Progress,
+    RunProgress,
     check_program,
     check_request,
     step_name,
@@ -61,7 +61,7 @@ class RunnerDiagnostics:
         self._diagnostics = Diagnostics(node)
 
     def publish(
-        self, progress: Progress | None, driver: Status, mode: Mode | None, last: Status
+        self, progress: RunProgress | None, driver: Status, mode: Mode | None, last: Status
     ) -> None:
         """`progress`: of the running program, None for none; `last`: how the one before ended."""
         level = OK
@@ -128,7 +128,7 @@ class ProgramRunnerNode(Node):
         **node_arguments: Any,
     ) -> None:
         super().__init__(names.PROGRAM_RUNNER, **node_arguments)
-        self._progress: Progress | None = None
+        self._progress: RunProgress | None = None
         self._settings = declare_parameters(self, lambda: self._progress is not None)
         links = self._settings.links.value
         self._send = send
@@ -189,7 +189,9 @@ class ProgramRunnerNode(Node):
             return self._end(
                 goal, ProgramResult(Status(StatusCode.INVALID_ROBOT_STATE, sentence), 0), 0.0, 0.0
             )
-        self._progress = progress = Progress(goal.request.program_id, (), self._driver.plant_time)
+        self._progress = progress = RunProgress(
+            goal.request.program_id, (), self._driver.plant_time
+        )
         after_stop = self._driver.stops
         try:
             status, movements = await self._fetch(goal.request)

@@ -162,7 +162,7 @@ _JOULES = 100.0
 _BIT = {row.mode: row.bit or "drives_off" for row in RESTS}
 
 
-class Pause:
+class PauseRun:
     """One pause; `run()` is the generator that returns a note, "" when all went as planned.
 
     end: of the clock of the outcomes [s], None: as long after its begin as planned.
@@ -429,7 +429,7 @@ class Program:
         yield from self._carry(movement.load)
         yield Announce(index, Event.STARTED)
         if movement.is_pause:
-            pause = Pause(movement, self._settings, self._times, self._end_of_pause(index))
+            pause = PauseRun(movement, self._settings, self._times, self._end_of_pause(index))
             note = yield from pause.run()
             if pause.restarted:
                 self._carried = ""  # the controller has started anew
@@ -488,7 +488,7 @@ class Program:
 
 
 @dataclass
-class Progress:
+class RunProgress:
     """State of one run; times of the plant [s]; step_done_ns: stamp of the end of the step, 0 while
     it goes on.
     """

@@ -26,8 +26,8 @@ from ir_sim_driver.load_check import LoadCheckSettings, LoadFinding
 from ir_sim_driver.motion import (
     ErrorCode,
     ExecutionSettings,
+    GoalOutcome,
     JointTolerance,
-    Outcome,
     TrajectoryGoal,
 )
 from ir_sim_driver.plant import (
@@ -35,7 +35,7 @@ from ir_sim_driver.plant import (
     Backend,
     Carried,
     ControlSettings,
-    Work,
+    MotorWork,
     carried,
     custom_load,
 )
@@ -55,13 +55,14 @@ __all__ = [
     "DriverError",
     "ErrorCode",
     "ExecutionSettings",
+    "GoalOutcome",
     "IdleTimes",
     "JointTolerance",
     "Link",
     "LinkError",
     "LoadCheckSettings",
     "LoadFinding",
-    "Outcome",
+    "MotorWork",
     "PlcSettings",
     "RequestRefusedError",
     "SettingsError",
@@ -70,7 +71,6 @@ __all__ = [
     "TrajectoryGoal",
     "TrajectoryRefusedError",
     "VettedGoal",
-    "Work",
     "carried",
     "custom_load",
     "make_simulation",

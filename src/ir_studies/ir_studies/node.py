@@ -32,7 +32,7 @@ from ir_msgs_py.status import Status, StatusCode
 from ir_recorder.errors import RecorderError
 from ir_studies.errors import SettingsError, StoppedError, StudyError
 from ir_studies.settings import StudiesSettings
-from ir_studies.studies import Answer, study_of
+from ir_studies.studies import StudyAnswer, study_of
 from ir_studies.work import Means
 from ir_values.errors import IrError
 from ir_values.files import FileRoots
@@ -159,7 +159,7 @@ class StudiesNode(Node):
         self._diagnostics.publish([Condition(names.STUDIES, OK, sentence, {}, "")])
 
 
-def fill(result: RunStudy.Result, answer: Answer, folder: Path) -> None:
+def fill(result: RunStudy.Result, answer: StudyAnswer, folder: Path) -> None:
     """The answer as a message; files relative to the folder, at most _ROWS rows."""
     result.summary = answer.summary
     result.files = [str(path.relative_to(folder)) for path in answer.files]

@@ -21,7 +21,7 @@ from ir_values.errors import unknown_name
 
 
 @dataclass(frozen=True)
-class Answer:
+class StudyAnswer:
     """summary: what follows from a study, in a few sentences; files that were written; table: CSV
     with a header, its best or summed up rows.
     """
@@ -40,7 +40,7 @@ class Kind:
     about: str
     example: str
     read: Callable[[str, Placed], Any]
-    run: Callable[[Any, Path, Means], Answer]
+    run: Callable[[Any, Path, Means], StudyAnswer]
 
 
 @dataclass(frozen=True)
@@ -50,24 +50,26 @@ class Study:
     kind: str
     settings: Any
 
-    def run(self, folder: str | Path, means: Means | None = None) -> Answer:
+    def run(self, folder: str | Path, means: Means | None = None) -> StudyAnswer:
         """Make what the folder doesn't have yet. Raises StudyError."""
         return KINDS[self.kind].run(self.settings, Path(folder), means or Means())
 
 
-def _run_arena(settings: arena.ArenaSettings, folder: Path, means: Means) -> Answer:
+def _run_arena(settings: arena.ArenaSettings, folder: Path, means: Means) -> StudyAnswer:
     finished = arena.run_arena(settings, folder, means)
-    return Answer(finished.summary, finished.files, finished.summed_up)
+    return StudyAnswer(finished.summary, finished.files, finished.summed_up)
 
 
-def _run_layout(settings: layout.LayoutSettings, folder: Path, means: Means) -> Answer:
+def _run_layout(settings: layout.LayoutSettings, folder: Path, means: Means) -> StudyAnswer:
     found = layout.run_layout(settings, folder, means)
-    return Answer(found.summary, found.files, found.table)
+    return StudyAnswer(found.summary, found.files, found.table)
 
 
-def _run_statistics(settings: statistics.StatisticsSettings, folder: Path, means: Means) -> Answer:
+def _run_statistics(
+    settings: statistics.StatisticsSettings, folder: Path, means: Means
+) -> StudyAnswer:
     finished = statistics.run_statistics(settings, folder, means)
-    return Answer(finished.summary, finished.files, finished.summed_up)
+    return StudyAnswer(finished.summary, finished.files, finished.summed_up)
 
 
 KINDS = {

@@ -22,7 +22,7 @@ _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 @dataclass(frozen=True)
-class Limits:
+class YamlLimits:
     """What a file may cost to read."""
 
     characters: int = 8_000_000
@@ -58,12 +58,12 @@ class Node:
 
 
 def parse_yaml(
-    text: str, source: str, error: type[DescriptionFileError], limits: Limits | None = None
+    text: str, source: str, error: type[DescriptionFileError], limits: YamlLimits | None = None
 ) -> Node:
     """Return the only document of `text` as a tree; every refusal is an `error` with path and
     line.
     """
-    limits = limits or Limits()
+    limits = limits or YamlLimits()
     if len(text) > limits.characters:
         raise error(
             source, 0, f"the text has {len(text)} characters, must be at most {limits.characters}"
@@ -99,7 +99,7 @@ class _Builder:
     """Builds the tree from the parser's events."""
 
     def __init__(
-        self, text: str, source: str, error: type[DescriptionFileError], limits: Limits
+        self, text: str, source: str, error: type[DescriptionFileError], limits: YamlLimits
     ) -> None:
         self._events = yaml.parse(text, Loader=_LOADER)
         self._source = source
@@ -240,7 +240,7 @@ def plain_yaml(path: Path) -> Any:
     return plain_values(text, str(path))
 
 
-def plain_values(text: str, source: str, limits: Limits | None = None) -> Any:
+def plain_values(text: str, source: str, limits: YamlLimits | None = None) -> Any:
     """The only document of a text as plain values: mappings, lists, numbers, texts, dates.
 
     DescriptionFileError with source and line for what `parse_yaml` refuses, and for numbers that

@@ -22,7 +22,7 @@ _COLOURS = ("#5b8def", "#e8590c", "#868e96", "#37b24d")
 
 
 @dataclass(frozen=True)
-class Mark:
+class FrontProgram:
     """A program with a name: its cycle time [s] and energy at the mains [J]; its id, "" for
     none.
     """
@@ -38,7 +38,7 @@ class Front:
     """Points by cycle time, and marks beside them."""
 
     points: tuple[ProgramPoint, ...]
-    marks: tuple[Mark, ...]
+    marks: tuple[FrontProgram, ...]
 
 
 def write_front(front: Front, path: Path) -> Path:
@@ -119,7 +119,7 @@ def run(arguments: argparse.Namespace) -> int:
             front_points=arguments.points,
         )
         cheapest = min(free.front, key=lambda point: point.energy)
-        choice = Mark(
+        choice = FrontProgram(
             "cheapest cycle time", cheapest.cycle_time, cheapest.energy, cheapest.program_id
         )
         if arguments.cycle_time > 0.0:
@@ -127,16 +127,21 @@ def run(arguments: argparse.Namespace) -> int:
             plan = client.plan_program(
                 arguments.stations, arguments.cycle_time, options, savings=False
             )
-            choice = Mark(
+            choice = FrontProgram(
                 "chosen cycle time", plan.report.duration, plan.report.energy, plan.program_id
             )
         progress.end(f"{len(free.front)} programs ({free.info.planning_time:.1f} s of planning)")
-    marks = [Mark("free plan", free.report.duration, free.report.energy, free.program_id), choice]
+    marks = [
+        FrontProgram("free plan", free.report.duration, free.report.energy, free.program_id),
+        choice,
+    ]
     if free.savings.available:
         total = free.savings.total
-        marks.append(Mark("common program", total.seconds, total.common, ""))
+        marks.append(FrontProgram("common program", total.seconds, total.common, ""))
         marks.append(
-            Mark("planned in its time", total.seconds, total.planned, free.savings.program_id)
+            FrontProgram(
+                "planned in its time", total.seconds, total.planned, free.savings.program_id
+            )
         )
     front = Front(free.front, tuple(marks))
     arguments.output.parent.mkdir(parents=True, exist_ok=True)

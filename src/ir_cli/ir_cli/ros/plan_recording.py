@@ -35,7 +35,7 @@ _STEP = 1_000_000  # ns between two messages, so that their order is seen
 
 
 @dataclass(frozen=True)
-class ProgramRequest:
+class RecordedRequest:
     """What was asked: stations (empty: the cell's program), cycle time [s], options, and whether
     the program was held against the common one.
     """
@@ -49,7 +49,7 @@ class ProgramRequest:
 def write_plan(
     path: str | Path,
     plan: ProgramPlan,
-    request: ProgramRequest,
+    request: RecordedRequest,
     planner: Planner,
     roots: FileRoots | None = None,
     overwrite: bool = False,
@@ -81,7 +81,7 @@ def write_plan(
 
 
 def _messages(
-    plan: ProgramPlan, request: ProgramRequest, planner: Planner, now: int
+    plan: ProgramPlan, request: RecordedRequest, planner: Planner, now: int
 ) -> list[tuple[str, str, bool, Any]]:
     """Topic, type, whether it is latched, and message, in the order in which the node publishes
     them.
@@ -102,7 +102,7 @@ def _messages(
     return [*found, (f"{names.PLANNER}/{names.CALLS}", "ir_msgs/msg/RecordedCall", False, call)]
 
 
-def _call(plan: ProgramPlan, request: ProgramRequest, now: int) -> RecordedCall:
+def _call(plan: ProgramPlan, request: RecordedRequest, now: int) -> RecordedCall:
     asked = PlanProgram.Request(
         stations=list(request.stations),
         cycle_time=request.cycle_time,

@@ -52,7 +52,7 @@ _ALWAYS = -1  # ns: what is latched was there before
 
 
 @dataclass(frozen=True)
-class Change:
+class KnownChange:
     """Something that the planner knew from `time` on [ns]: `make` it known to another planner."""
 
     time: int
@@ -111,10 +111,10 @@ class RecordedPlanner:
                     _nanoseconds(call.header.stamp), call.service, call.type, request, response
                 )
 
-    def changes(self) -> list[Change]:
+    def changes(self) -> list[KnownChange]:
         """What the planner learnt meanwhile, in the order of time."""
         found = [
-            Change(_nanoseconds(message.header.stamp), _set_cell(message.cell_yaml))
+            KnownChange(_nanoseconds(message.header.stamp), _set_cell(message.cell_yaml))
             for _, message in self._cells[1:]
         ]
         for name, learn in (
@@ -123,12 +123,12 @@ class RecordedPlanner:
             (names.MACHINE_STATES, _hear_machines),
         ):
             for number, (time, message) in enumerate(self._heard(name)):
-                found.append(Change(time if number else _ALWAYS, learn(message)))
+                found.append(KnownChange(time if number else _ALWAYS, learn(message)))
         for time, event in self._heard(names.PARAMETER_EVENTS):
             if event.node == self._prefix + names.PLANNER:
                 pairs = (*event.new_parameters, *event.changed_parameters)
                 values = {each.name: parameter_value_to_python(each.value) for each in pairs}
-                found.append(Change(time, _set_parameters(values)))
+                found.append(KnownChange(time, _set_parameters(values)))
         return sorted(found, key=lambda change: change.time)
 
     def states(self) -> list[tuple[int, Any]]:
@@ -293,7 +293,7 @@ IDS = ("trajectory_id", "program_id")
 _FREE = 1e-9  # s: the age of a state that is as it was
 
 
-class Comparison(StrEnum):
+class ReplayVerdict(StrEnum):
     """What came of a request."""
 
     EQUAL = "equal"
@@ -307,7 +307,7 @@ class Replanned:
 
     service: str
     ids: int
-    verdict: Comparison
+    verdict: ReplayVerdict
     sentence: str = ""
 
 
@@ -353,14 +353,14 @@ def _again(planner: Planner, call: Call, states: list[tuple[int, bytes]]) -> Rep
     if not _front(call.response):  # a recording of an earlier version has no ids of the front
         now = {key: value for key, value in now.items() if not key.startswith("pareto_ids")}
     if before == now:
-        return Replanned(call.service, len(before) - 1, Comparison.EQUAL)
+        return Replanned(call.service, len(before) - 1, ReplayVerdict.EQUAL)
     other = [key for key in before | now if before.get(key) != now.get(key)]
     key = other[0]
     said = answer.status.message
     sentence = f"{key} was {before.get(key, 'none')}, is {now.get(key, 'none')}"
     sentence += f"; {len(other)} of {len(before | now)} differ" if len(other) > 1 else ""
     return Replanned(
-        call.service, len(before) - 1, Comparison.DIFFERENT, f"{sentence}; {said}".strip("; ")
+        call.service, len(before) - 1, ReplayVerdict.DIFFERENT, f"{sentence}; {said}".strip("; ")
     )
 
 
@@ -408,7 +408,7 @@ def _start(planner: Planner, call: Call, states: list[tuple[int, bytes]]) -> Any
 
 
 def _not_compared(call: Call, why: str) -> Replanned:
-    return Replanned(call.service, 0, Comparison.NOT_COMPARED, why)
+    return Replanned(call.service, 0, ReplayVerdict.NOT_COMPARED, why)
 
 
 def add_replan(again: argparse.ArgumentParser) -> None:
@@ -435,8 +435,8 @@ def run_replan(arguments: argparse.Namespace) -> int:
 
 def all_equal(found: list[Replanned]) -> bool:
     """Whether something was compared, and nothing differs."""
-    return any(each.verdict is Comparison.EQUAL for each in found) and not any(
-        each.verdict is Comparison.DIFFERENT for each in found
+    return any(each.verdict is ReplayVerdict.EQUAL for each in found) and not any(
+        each.verdict is ReplayVerdict.DIFFERENT for each in found
     )
 
 
@@ -444,15 +444,15 @@ def sentence_of(found: list[Replanned], differences: list[str]) -> str:
     """What came of all requests, and what may explain it."""
     if not found:
         return "the recording holds no request that plans"
-    count = {verdict: sum(each.verdict is verdict for each in found) for verdict in Comparison}
-    ids = sum(each.ids for each in found if each.verdict is Comparison.EQUAL)
+    count = {verdict: sum(each.verdict is verdict for each in found) for verdict in ReplayVerdict}
+    ids = sum(each.ids for each in found if each.verdict is ReplayVerdict.EQUAL)
     parts = [
-        f"{count[Comparison.EQUAL]} of {len(found)} requests planned again with equal ids "
+        f"{count[ReplayVerdict.EQUAL]} of {len(found)} requests planned again with equal ids "
         f"({ids} ids)"
     ]
     parts += [
         f"{count[kind]} {kind}"
-        for kind in (Comparison.DIFFERENT, Comparison.NOT_COMPARED)
+        for kind in (ReplayVerdict.DIFFERENT, ReplayVerdict.NOT_COMPARED)
         if count[kind]
     ]
     if differences:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_cli.station_access import MARGIN, Visit, visits
+from ir_cli.station_access import MARGIN, StationVisit, visits
 from ir_description import Cell, PartPlaces
 from ir_kernels import CollisionModel
 from ir_msgs_py.report import PlannedMovement
@@ -41,7 +41,7 @@ def station_accesses(cell: Cell, first: Collection[str] = ()) -> Iterator[Statio
     yield from map(_judged, sorted(visits(cell), key=lambda visit: visit.station.name not in first))
 
 
-def _judged(visit: Visit) -> StationAccess:
+def _judged(visit: StationVisit) -> StationAccess:
     station = visit.station
     scene = visit.scene
     threshold = scene.thresholds(MARGIN, station.name)

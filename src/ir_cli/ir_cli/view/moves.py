@@ -66,7 +66,7 @@ _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 @dataclass(frozen=True)
-class Target:
+class DragTarget:
     """What is dragged: a machine, or a station within its machine."""
 
     kind: Kind
@@ -78,17 +78,19 @@ class Target:
         return f"{'machine' if self.kind == 'equipment' else self.kind} {self.name}"
 
 
-Moves = Mapping[Target, FloatArray]
+Moves = Mapping[DragTarget, FloatArray]
 """New poses (4, 4): of machines in the world, of stations in their machine."""
 
 
-def targets(cell: Cell) -> list[Target]:
+def targets(cell: Cell) -> list[DragTarget]:
     """Everything in a cell that can be dragged."""
-    machines = [Target("equipment", machine.name) for machine in cell.equipment if machine.enabled]
-    return [*machines, *(Target("station", station.name) for station in cell.stations)]
+    machines = [
+        DragTarget("equipment", machine.name) for machine in cell.equipment if machine.enabled
+    ]
+    return [*machines, *(DragTarget("station", station.name) for station in cell.stations)]
 
 
-def pose_in(cell: Cell, target: Target) -> FloatArray:
+def pose_in(cell: Cell, target: DragTarget) -> FloatArray:
     """The pose (4, 4) of a target, as a move gives it."""
     if target.kind == "equipment":
         return cell.machine(target.name).pose
@@ -128,12 +130,12 @@ def edited(text: str, cell: Cell, moves: Moves) -> str:
     return text
 
 
-def _places(root: yaml.Node | None) -> Iterator[tuple[Target, yaml.MappingNode]]:
+def _places(root: yaml.Node | None) -> Iterator[tuple[DragTarget, yaml.MappingNode]]:
     """Every machine and station of a document with its mapping."""
     for machine in _items(_value(root, "equipment")):
-        yield Target("equipment", _scalar(_value(machine, "name"))), machine
+        yield DragTarget("equipment", _scalar(_value(machine, "name"))), machine
         for station in _items(_value(machine, "stations")):
-            yield Target("station", _scalar(_value(station, "name"))), station
+            yield DragTarget("station", _scalar(_value(station, "name"))), station
 
 
 def _changes(
@@ -215,7 +217,7 @@ def _number(value: float) -> str:
     return repr(value + 0.0).removesuffix(".0")
 
 
-def moved_pose(target: Target, pose: FloatArray, cell: Cell, file: Cell) -> FloatArray:
+def moved_pose(target: DragTarget, pose: FloatArray, cell: Cell, file: Cell) -> FloatArray:
     """The pose (4, 4) of a move that puts a target at `pose` in the world, on the grid of what is
     written; file: as it was.
     """

@@ -15,7 +15,7 @@ from ir_cli.view.background import QUIET, Inbox, Listener, Planned, PlanWorker, 
 from ir_cli.view.cell_file import Recorded, SavingError, Watched, save
 from ir_cli.view.clearance import Nearest, NearestPairs, StationAccess, names_in
 from ir_cli.view.moves import (
-    Target,
+    DragTarget,
     cell_with,
     moved_pose,
     numbers_of,
@@ -28,7 +28,7 @@ from ir_cli.view.scene import planned_content, recorded_content, still_content
 from ir_description import Cell, DescriptionError, PartPlaces, cell_to_yaml
 from ir_description.poses import composed, inverse
 from ir_msgs_py.report import PlannedMovement, TrajectoryReport
-from ir_recorder.live.server import Answer, LiveServer, Site
+from ir_recorder.live.server import ButtonAnswer, LiveServer, Site
 from ir_recorder.live.stream import Stream
 from ir_recorder.report.cell_scene import matrix
 from ir_recorder.report.data import page_content
@@ -75,7 +75,7 @@ CELL_SITE = Site(
 # The cell with its robot, what it holds, and what is wrong.
 
 
-class Stage:
+class ShownCell:
     """A cell as it is shown, its robot at q (n,).
 
     found, failure and errors say what is wrong with it, note what happened last.
@@ -147,7 +147,7 @@ _SAME = 1e-9  # m, of poses
 
 
 @dataclass(frozen=True)
-class Control:
+class ViewControl:
     """What a control does, in the session's thread, and what kind of value it takes."""
 
     act: Callable[[Any], None]
@@ -170,23 +170,23 @@ class Session:
         self._number = 0
         self._scenes = 0
         self._motion: PlayedMotion | None = None
-        self._moves: dict[Target, FloatArray] = {}
+        self._moves: dict[DragTarget, FloatArray] = {}
         self._file: Cell | None = None
         self._drawn: Cell | None = None  # as the scene has it
-        self._stage: Stage | None = None
+        self._stage: ShownCell | None = None
         self._looked = time.monotonic()
         self._beat = self._looked
         self._controls = {
-            "joints": Control(self._joints, (list,)),
-            "at": Control(self._at, (str,)),
-            "time": Control(self._time, (int, float)),
-            "move": Control(self._move, (list,)),
-            "undo": Control(self._undo),
-            "save": Control(self._save),
-            "plan": Control(lambda _: self._ask()),
-            "cancel": Control(self._cancel),
-            "compare": Control(self._compare),
-            "recorded": Control(self._replay),
+            "joints": ViewControl(self._joints, (list,)),
+            "at": ViewControl(self._at, (str,)),
+            "time": ViewControl(self._time, (int, float)),
+            "move": ViewControl(self._move, (list,)),
+            "undo": ViewControl(self._undo),
+            "save": ViewControl(self._save),
+            "plan": ViewControl(lambda _: self._ask()),
+            "cancel": ViewControl(self._cancel),
+            "compare": ViewControl(self._compare),
+            "recorded": ViewControl(self._replay),
         }
         self.server = LiveServer(
             self._stream, self._press, lambda: self._scene, port, site=CELL_SITE
@@ -217,19 +217,21 @@ class Session:
         self._worker.close()
         self.server.close()
 
-    def _press(self, name: str, value: Any) -> Answer:
+    def _press(self, name: str, value: Any) -> ButtonAnswer:
         """What a browser asks for: refused, or done by the session's thread."""
         control = self._controls.get(name)
         if control is None:
             known = ", ".join(self._controls)
-            return Answer(False, f"{name[:60]!r} is no control of this page: known are {known}")
+            return ButtonAnswer(
+                False, f"{name[:60]!r} is no control of this page: known are {known}"
+            )
         if not isinstance(value, control.kind) or (
             bool not in control.kind and isinstance(value, bool)
         ):
             kinds = " or ".join(kind.__name__ for kind in control.kind)
-            return Answer(False, f"{name} must have a value of the kind {kinds}")
+            return ButtonAnswer(False, f"{name} must have a value of the kind {kinds}")
         self._inbox.post(name, partial(control.act, value))
-        return Answer(True, "")
+        return ButtonAnswer(True, "")
 
     def _say(self, **values: Json) -> None:
         self._stream.add(values, always=("q", "hand") if values.get("hand") else ())
@@ -262,7 +264,7 @@ class Session:
         q = np.array(cell.machine_home) if other or before is None else before.q
         self._file = cell
         self._moves = {}
-        stage = Stage(cell, q)
+        stage = ShownCell(cell, q)
         self._stage = stage
         stage.note = note
         stage.stand(q)
@@ -430,7 +432,9 @@ class Session:
             return
         self._take(cell, moves, target)
 
-    def _take(self, cell: Cell, moves: dict[Target, FloatArray], target: Target | None) -> None:
+    def _take(
+        self, cell: Cell, moves: dict[DragTarget, FloatArray], target: DragTarget | None
+    ) -> None:
         """Show and plan the cell with these moves; target: what moved last."""
         stage = self._stage
         assert stage is not None

@@ -40,7 +40,7 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class SensedPoints:
     """What a depth sensor saw, in the file's unit: points (N, 3), or heights (R, C) over a grid
     whose sample [r, c] stands at x = c pitch, y = r pitch (NaN where nothing was seen).
 
@@ -253,7 +253,7 @@ def _joined(low: IntArray, high: IntArray, axes: tuple[int, ...]) -> tuple[IntAr
 # Files
 
 
-def read_cloud(folder: Path, name: str, *, heights: bool = False) -> Measured:
+def read_cloud(folder: Path, name: str, *, heights: bool = False) -> SensedPoints:
     """Return what a file beside the cell file holds; nothing outside the folder is opened.
 
     heights: whether an array (R, 3) is three columns of a height map, not R points. Raises
@@ -272,7 +272,7 @@ def read_cloud(folder: Path, name: str, *, heights: bool = False) -> Measured:
     return _of_points(points, notes)
 
 
-def _of_points(points: FloatArray, notes: tuple[str, ...] = ()) -> Measured:
+def _of_points(points: FloatArray, notes: tuple[str, ...] = ()) -> SensedPoints:
     if len(points) > POINTS_MAX:
         raise InvalidValueError(f"has {len(points)} points, must have at most {POINTS_MAX}")
     finite = np.isfinite(points).all(axis=1)
@@ -281,10 +281,10 @@ def _of_points(points: FloatArray, notes: tuple[str, ...] = ()) -> Measured:
     if not finite.all():
         left = np.count_nonzero(~finite)
         notes = (*notes, f"{left} points are not finite (nothing was seen there): left out")
-    return Measured(points[finite], None, notes)
+    return SensedPoints(points[finite], None, notes)
 
 
-def _from_array(content: bytes, *, heights: bool) -> Measured:
+def _from_array(content: bytes, *, heights: bool) -> SensedPoints:
     """Points (N, 3), an organised cloud (R, C, 3), or heights (R, C)."""
     try:
         array: Any = np.load(io.BytesIO(content), allow_pickle=False)
@@ -307,7 +307,7 @@ def _from_array(content: bytes, *, heights: bool) -> Measured:
         raise InvalidValueError("has no finite height")
     if np.isposinf(values).any():
         raise InvalidValueError("has an infinite height: NaN is where nothing was seen")
-    return Measured(None, values, ())
+    return SensedPoints(None, values, ())
 
 
 def _from_ply(content: bytes) -> FloatArray:

@@ -70,7 +70,7 @@ def read_world(path: Path, taken: NameRegister, *, visuals: bool = False) -> Wor
         text = read_regular_file(path, BYTES_MAX).decode("utf-8")
     except UnicodeDecodeError as error:
         raise InvalidValueError(f"this is no text: {shown(str(error), 120)}") from error
-    reader = _Reader(path.parent, taken, visuals)
+    reader = _WorldReader(path.parent, taken, visuals)
     try:
         if path.suffix.lower() == ".scene":
             name, objects = scene_objects(text)
@@ -139,7 +139,7 @@ def _document(text: str) -> Xml.Element:
     return root
 
 
-class _Reader:
+class _WorldReader:
     """One reading."""
 
     def __init__(self, folder: Path, taken: NameRegister, visuals: bool) -> None:

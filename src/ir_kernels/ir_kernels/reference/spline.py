@@ -28,7 +28,7 @@ STRAIGHT = 1e-12  # sine of a tilt at which no way back is nearer than another
 
 
 @dataclass
-class Samples:
+class CostSamples:
     """q, qd, qdd (N, n) at N places, and derivatives of the cost by them and by the time between
     two.
     """
@@ -86,7 +86,7 @@ def torque_limit(data: DynamicsData, speed: FloatArray) -> tuple[FloatArray, Flo
     return limit, slope
 
 
-def torques(data: DynamicsData, s: Samples) -> FloatArray:
+def torques(data: DynamicsData, s: CostSamples) -> FloatArray:
     """Torque (N, n) of the motors, with friction that turns round smoothly."""
     speed = dynamics.motor_speed(data, s.qd)
     friction = data.viscous * speed + data.coulomb * speed / np.hypot(speed, STILL)
@@ -95,7 +95,7 @@ def torques(data: DynamicsData, s: Samples) -> FloatArray:
     return through + data.rotor_inertia * dynamics.motor_speed(data, s.qdd) + friction
 
 
-def torques_back(data: DynamicsData, s: Samples, of_torque: FloatArray) -> None:
+def torques_back(data: DynamicsData, s: CostSamples, of_torque: FloatArray) -> None:
     """Hand derivatives of the cost by the torques (N, n) on to positions, speeds and
     accelerations.
     """
@@ -174,7 +174,7 @@ class SplineCost:
         weights[2] /= interval**2
         zeros = np.zeros((count * SAMPLES, control.shape[1]))
         q, qd, qdd = weights @ control
-        s = Samples(q, qd, qdd, zeros, zeros.copy(), zeros.copy())
+        s = CostSamples(q, qd, qdd, zeros, zeros.copy(), zeros.copy())
         with np.errstate(
             over="ignore", invalid="ignore"
         ):  # as in the compiled core: inf and nan say it
@@ -238,7 +238,7 @@ class SplineCost:
         points, now = spline(x)
         return points, now, value, used
 
-    def _drives(self, s: Samples, step: float) -> tuple[float, float]:
+    def _drives(self, s: CostSamples, step: float) -> tuple[float, float]:
         """Cost of energy and travel, of torque and speed beyond their limits; and the energy."""
         t = self.terms
         data = self.data
@@ -272,7 +272,7 @@ class SplineCost:
         s.of_step += rate + t.energy_value * (supplied + of_step)
         return rate * step + t.energy_value * energy, energy
 
-    def _clearance(self, s: Samples, row: IntArray, step: float) -> float:
+    def _clearance(self, s: CostSamples, row: IntArray, step: float) -> float:
         """Cost of pairs nearer than their threshold and the margin."""
         t = self.terms
         model = self.geometry
@@ -293,7 +293,7 @@ class SplineCost:
         s.of_step += rate
         return rate * step
 
-    def _tilt(self, s: Samples, step: float) -> float:
+    def _tilt(self, s: CostSamples, step: float) -> float:
         """Cost of an axis of the last link that leans too far from a direction of the world."""
         t = self.terms
         if t.tilt_max >= np.pi or not np.isfinite(s.q).all():

@@ -2,6 +2,6 @@
 complaint.
 """
 
-from ir_krl.language.parse import Parameter, Routine, Source, Tree, Word, parse, place_of
+from ir_krl.language.parse import Parameter, Routine, SourceFile, SyntaxTree, Word, parse, place_of
 
-__all__ = ["Parameter", "Routine", "Source", "Tree", "Word", "parse", "place_of"]
+__all__ = ["Parameter", "Routine", "SourceFile", "SyntaxTree", "Word", "parse", "place_of"]

@@ -18,7 +18,7 @@ from lark import Lark, Token
 from lark import Tree as ParseTree
 from lark.exceptions import UnexpectedCharacters, UnexpectedInput
 
-from ir_krl.errors import KrlError, Place
+from ir_krl.errors import KrlError, SourcePlace
 
 TEXT_MAX = 4_000_000
 """Characters of one file that are read: a program of this size has some 100,000 lines."""
@@ -72,7 +72,7 @@ _KNOWN_ELSEWHERE = {
 
 
 @dataclass(frozen=True, eq=False)
-class Tree:
+class SyntaxTree:
     """A piece of the program: the grammar's rule, and its children: trees, words, None for what
     lacks.
     """
@@ -116,52 +116,54 @@ class Routine:
 
     name: str
     parameters: tuple[Parameter, ...]
-    body: Tree
+    body: SyntaxTree
     result: str
     file: str
     everywhere: bool = False
 
 
 @dataclass(frozen=True, eq=False)
-class Source:
+class SourceFile:
     """One file: its routines in their order, the bodies of its data lists, and the versions of the
     system software that wrote its inline forms.
     """
 
     file: str
     routines: tuple[Routine, ...]
-    data: tuple[Tree, ...]
+    data: tuple[SyntaxTree, ...]
     versions: frozenset[tuple[int, int]] = frozenset()
 
 
-def parse(text: str, file: str) -> Source:
+def parse(text: str, file: str) -> SourceFile:
     """Read the text of a .src or .dat file; `file` is the name that complaints carry.
 
     Raises KrlError with line and column.
     """
     if len(text) > TEXT_MAX:
-        raise KrlError(f"{len(text)} characters: at most {TEXT_MAX} are read", Place(file))
+        raise KrlError(f"{len(text)} characters: at most {TEXT_MAX} are read", SourcePlace(file))
     text = (
         text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     )  # as editors leave them
     try:
         units = _tree(_parser().parse(_prepared(text) + "\n")).children
     except RecursionError:
-        raise KrlError("brackets, signs or blocks are nested too deeply", Place(file)) from None
+        raise KrlError(
+            "brackets, signs or blocks are nested too deeply", SourcePlace(file)
+        ) from None
     except UnexpectedInput as error:
         sentence, column = _complaint(error, text)
-        raise KrlError(sentence, Place(file, error.line, column)) from None
+        raise KrlError(sentence, SourcePlace(file, error.line, column)) from None
     routines = [_routine(unit, file) for unit in units if unit.data in ("routine", "function")]
     data = tuple(unit.children[-1] for unit in units if unit.data == "data_list")
     versions = frozenset(
         (int(found[1]), int(found[2])) if found[1] else _PROVIDER for found in _STAMP.finditer(text)
     )
-    return Source(file, tuple(routines), data, versions)
+    return SourceFile(file, tuple(routines), data, versions)
 
 
-def place_of(node: Tree | Word, file: str) -> Place:
+def place_of(node: SyntaxTree | Word, file: str) -> SourcePlace:
     """Where a tree or a word begins."""
-    return Place(file, node.line, node.column)
+    return SourcePlace(file, node.line, node.column)
 
 
 def _tree(node: Any) -> Any:
@@ -169,7 +171,9 @@ def _tree(node: Any) -> Any:
     if isinstance(node, ParseTree):
         meta = node.meta
         children = tuple(_tree(child) for child in node.children)
-        return Tree(str(node.data), children, getattr(meta, "line", 0), getattr(meta, "column", 0))
+        return SyntaxTree(
+            str(node.data), children, getattr(meta, "line", 0), getattr(meta, "column", 0)
+        )
     return Word(str(node), node.line or 0, node.column or 0) if isinstance(node, Token) else node
 
 
@@ -191,7 +195,7 @@ def _parser() -> Lark:
     return Lark(grammar, parser="lalr", propagate_positions=True, maybe_placeholders=True)
 
 
-def _routine(unit: Tree, file: str) -> Routine:
+def _routine(unit: SyntaxTree, file: str) -> Routine:
     everywhere, *head, parameters, body = (one for one in unit.children if not _is_sizes(one))
     result, name = ("", *head) if unit.data == "routine" else head
     found = [_parameter(one) for one in parameters.children if one is not None]
@@ -200,10 +204,10 @@ def _routine(unit: Tree, file: str) -> Routine:
 
 def _is_sizes(node: Any) -> bool:
     """Whether a node is the size of an array: [16] of a type or of a parameter."""
-    return isinstance(node, Tree) and node.data == "sizes"
+    return isinstance(node, SyntaxTree) and node.data == "sizes"
 
 
-def _parameter(tree: Tree) -> Parameter:
+def _parameter(tree: SyntaxTree) -> Parameter:
     name, *direction = (str(one) for one in tree.children if one and not _is_sizes(one))
     return Parameter(name, direction != ["IN"], bool(direction))
 

@@ -3,6 +3,7 @@ out.
 """
 
 from ir_krl.run.commands import (
+    AdvanceStop,
     Blend,
     Command,
     Motion,
@@ -10,12 +11,11 @@ from ir_krl.run.commands import (
     SetOutput,
     Speeds,
     SplineBlock,
-    Stop,
+    StandStill,
     Switch,
     Target,
     TimeBlock,
-    Wait,
-    WaitFor,
+    WaitForCondition,
 )
 from ir_krl.run.memory import SignalRange
 from ir_krl.run.notes import Effect, Note, worst_first
@@ -25,6 +25,7 @@ from ir_krl.run.values import FRAME_NAMES
 
 __all__ = [
     "FRAME_NAMES",
+    "AdvanceStop",
     "Blend",
     "Command",
     "Effect",
@@ -37,13 +38,12 @@ __all__ = [
     "SignalRange",
     "Speeds",
     "SplineBlock",
-    "Stop",
+    "StandStill",
     "Switch",
     "Target",
     "TimeBlock",
     "UnknownRoutine",
-    "Wait",
-    "WaitFor",
+    "WaitForCondition",
     "follow",
     "worst_first",
 ]

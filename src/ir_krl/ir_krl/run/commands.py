@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from ir_kernels import portable
-from ir_krl.errors import Place
+from ir_krl.errors import SourcePlace
 from ir_krl.run.system import AXES
 from ir_values.arrays import FloatArray
 
@@ -124,7 +124,7 @@ class Motion:
     kind: Kind
     target: Target
     speeds: Speeds
-    place: Place
+    place: SourcePlace
     blend: Blend | None = None
     via: Target | None = None
     angle: float | None = None
@@ -143,7 +143,7 @@ class TimeBlock:
     last: int
     marks: tuple[tuple[int, float], ...]
     seconds: float
-    place: Place
+    place: SourcePlace
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,34 +155,34 @@ class SplineBlock:
     axis: bool
     parts: tuple[Motion, ...]
     times: tuple[TimeBlock, ...]
-    place: Place
+    place: SourcePlace
     blend: Blend | None = None
 
 
 @dataclass(frozen=True)
-class Wait:
+class StandStill:
     """The robot stands still for `seconds`."""
 
     seconds: float
-    place: Place
+    place: SourcePlace
 
 
 @dataclass(frozen=True)
-class WaitFor:
+class WaitForCondition:
     """The robot stands still until `condition` (as the program writes it) holds."""
 
     condition: str
-    place: Place
+    place: SourcePlace
 
 
 @dataclass(frozen=True)
-class Stop:
+class AdvanceStop:
     """The advance run stops at `place`, for what `why` names: the motion before ends at rest,
     whatever it says of approximate positioning.
     """
 
     why: str
-    place: Place
+    place: SourcePlace
 
 
 @dataclass(frozen=True)
@@ -214,10 +214,10 @@ class SetOutput:
 
     number: int
     value: bool
-    place: Place
+    place: SourcePlace
     pulse: float = 0.0
     on_path: bool = False
     switch: Switch | None = None
 
 
-Command: TypeAlias = Motion | SplineBlock | Wait | WaitFor | SetOutput | Stop
+Command: TypeAlias = Motion | SplineBlock | StandStill | WaitForCondition | SetOutput | AdvanceStop

@@ -6,9 +6,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ir_krl.errors import KrlRunError, Place
-from ir_krl.language import Tree, Word, place_of
-from ir_krl.run.commands import Command, Motion, SplineBlock, Stop, Switch, Wait, WaitFor
+from ir_krl.errors import KrlRunError, SourcePlace
+from ir_krl.language import SyntaxTree, Word, place_of
+from ir_krl.run.commands import (
+    AdvanceStop,
+    Command,
+    Motion,
+    SplineBlock,
+    StandStill,
+    Switch,
+    WaitForCondition,
+)
 from ir_krl.run.expressions import Expressions, same
 from ir_krl.run.memory import (
     CYCLIC,
@@ -49,7 +57,7 @@ class Jump(Exception):  # noqa: N818 - no error: a statement
     """GOTO a label. known: a branch around it was taken by values that are known."""
 
     label: str
-    place: Place
+    place: SourcePlace
     known: bool = False
 
 
@@ -96,16 +104,18 @@ class Control:
     _guessed_exits: int = 0  # times that an assumed value decided about leaving a loop
     _known_exits: int = 0  # and a known one
     _timers: dict[int, Clock] = field(default_factory=dict)
-    _flags: dict[int, Tree] = field(default_factory=dict)  # what cyclical flags are set to
+    _flags: dict[int, SyntaxTree] = field(default_factory=dict)  # what cyclical flags are set to
     _said: dict[tuple[str, Effect], int] = field(default_factory=dict)  # where among the notes
-    _places: dict[int, set[Place]] = field(default_factory=dict)  # of a note that is said again
+    _places: dict[int, set[SourcePlace]] = field(
+        default_factory=dict
+    )  # of a note that is said again
 
     def _at(self, file: str) -> None:
         """Statements of this file run from here on."""
         self.expressions.file = file
         self.memory.module = module_of(file)
 
-    def body(self, body: Tree) -> None:
+    def body(self, body: SyntaxTree) -> None:
         """Run all statements of a body; jumps to its labels are followed."""
         turns: dict[str, _Turn] = {}
         try:
@@ -114,7 +124,7 @@ class Control:
             for turn in turns.values():
                 self.memory.forget(turn.watched)
 
-    def _statements(self, body: Tree, turns: dict[str, _Turn]) -> None:
+    def _statements(self, body: SyntaxTree, turns: dict[str, _Turn]) -> None:
         at = 0
         while at < len(body.children):
             try:
@@ -128,7 +138,7 @@ class Control:
                 again = not back or self._turns_back(body.children[target : at + 1], jump, turns)
                 at = target if again else at + 1
 
-    def _statement(self, statement: Tree) -> None:
+    def _statement(self, statement: SyntaxTree) -> None:
         self.statements += 1
         self._check_budget(statement)
         try:
@@ -139,7 +149,9 @@ class Control:
             raise KrlRunError(error.reason, self.place(statement)) from None
         self.continuing = self._beside or statement.data == "continue_"
 
-    def _turns_back(self, between: Sequence[Tree], jump: Jump, turns: dict[str, _Turn]) -> bool:
+    def _turns_back(
+        self, between: Sequence[SyntaxTree], jump: Jump, turns: dict[str, _Turn]
+    ) -> bool:
         """Whether a jump back is followed: not for ever, where nothing that is known ends it."""
         turn = turns.get(jump.label)
         if turn is None:
@@ -159,15 +171,15 @@ class Control:
         turn.exits = self._guessed_exits
         return True
 
-    def place(self, tree: Tree | Word) -> Place:
+    def place(self, tree: SyntaxTree | Word) -> SourcePlace:
         """Where a piece of the program stands."""
         return place_of(tree, self.expressions.file)
 
-    def note(self, tree: Tree | Word, text: str, effect: Effect = Effect.NONE) -> None:
+    def note(self, tree: SyntaxTree | Word, text: str, effect: Effect = Effect.NONE) -> None:
         """Note once what a reader should know."""
         self.note_at(self.place(tree), text, effect)
 
-    def note_at(self, place: Place, text: str, effect: Effect = Effect.NONE) -> None:
+    def note_at(self, place: SourcePlace, text: str, effect: Effect = Effect.NONE) -> None:
         """The same of a place."""
         at = self._said.setdefault((text, effect), len(self.notes))
         if at == len(self.notes):
@@ -176,14 +188,14 @@ class Control:
             self._places[at].add(place)
             self.notes[at] = replace(self.notes[at], places=len(self._places[at]))
 
-    def stop(self, place: Place, why: str, *, assumed: bool = False) -> None:
+    def stop(self, place: SourcePlace, why: str, *, assumed: bool = False) -> None:
         """The advance run stops here, unless CONTINUE stands before: no corner is rounded. assumed:
         a note says so already.
         """
         if not self.continuing:
             self.memory.arrived()
         if not self.continuing and self._rounding:
-            self.commands.append(Stop(why, place))
+            self.commands.append(AdvanceStop(why, place))
             if not assumed:
                 self.note_at(place, f"{why} stops the advance run: the motion before ends at rest")
 
@@ -198,18 +210,21 @@ class Control:
         for command in reversed(self.commands):
             if isinstance(command, Motion | SplineBlock):
                 return command.blend is not None
-            if isinstance(command, Stop | Wait | WaitFor) or not command.on_path:
+            if (
+                isinstance(command, AdvanceStop | StandStill | WaitForCondition)
+                or not command.on_path
+            ):
                 return False
         return False
 
-    def _decided(self, tree: Tree, what: str) -> tuple[bool, bool]:
+    def _decided(self, tree: SyntaxTree, what: str) -> tuple[bool, bool]:
         """A condition, and whether it hangs on an assumed value or on nothing at all."""
         before = self.memory.guesses
         holds = self.expressions.truth(tree, what)
         self.continuing = self._beside
         return holds, self.memory.guesses > before or _constant(tree)
 
-    def _if_(self, tree: Tree) -> None:
+    def _if_(self, tree: SyntaxTree) -> None:
         condition, then, otherwise = tree.children
         holds, open_ = self._decided(condition, "the condition of IF")
         self._count_exits(tree, open_=open_)
@@ -217,7 +232,7 @@ class Control:
         if chosen is not None:
             self._branch(chosen, open_=open_)
 
-    def _branch(self, body: Tree, *, open_: bool) -> None:
+    def _branch(self, body: SyntaxTree, *, open_: bool) -> None:
         """A branch that a condition has chosen; open_: by an assumed value, or by none."""
         try:
             self.body(body)
@@ -225,13 +240,13 @@ class Control:
             jump.known = jump.known or not open_
             raise
 
-    def _count_exits(self, tree: Tree, *, open_: bool) -> None:
+    def _count_exits(self, tree: SyntaxTree, *, open_: bool) -> None:
         """Count a condition that decides whether a loop is left."""
         if _leaves(tree):
             self._guessed_exits += open_
             self._known_exits += not open_
 
-    def _for_(self, tree: Tree) -> None:
+    def _for_(self, tree: SyntaxTree) -> None:
         name, first, last, step, body = tree.children
         value, end = (self.expressions.bound(one) for one in (first, last))
         by = 1 if step is None else integer(self.expressions.value(step), "STEP", self.place(step))
@@ -249,22 +264,22 @@ class Control:
         except LoopExit:
             pass
 
-    def _loop(self, tree: Tree) -> None:
+    def _loop(self, tree: SyntaxTree) -> None:
         body = tree.children[0]
         open_ = None if _leaves(body) else True
         self._repeated(tree, body, "LOOP", lambda: (True, open_))
 
-    def _while_(self, tree: Tree) -> None:
+    def _while_(self, tree: SyntaxTree) -> None:
         condition, body = tree.children
         holds, _ = self._decided(condition, "the condition of WHILE")
         if holds:
             self._repeated(tree, body, "WHILE", self._again(condition, body, wanted=True))
 
-    def _repeat(self, tree: Tree) -> None:
+    def _repeat(self, tree: SyntaxTree) -> None:
         body, condition = tree.children
         self._repeated(tree, body, "REPEAT", self._again(condition, body, wanted=False))
 
-    def _again(self, condition: Tree, body: Tree, *, wanted: bool) -> Again:
+    def _again(self, condition: SyntaxTree, body: SyntaxTree, *, wanted: bool) -> Again:
         """Asks whether a loop goes on, and whether that hangs on nothing that is known."""
         exits = _constant(condition) and _leaves(body)
 
@@ -274,7 +289,7 @@ class Control:
 
         return asked
 
-    def _repeated(self, tree: Tree, body: Tree, word: str, again: Again) -> None:
+    def _repeated(self, tree: SyntaxTree, body: SyntaxTree, word: str, again: Again) -> None:
         """Passes of a loop while `again` says so. One that nothing known ends, since it hangs on
         assumed values or leaves everything as it was, is left after `loop_passes`.
         """
@@ -291,11 +306,13 @@ class Control:
             return
         self._left(self.place(tree), word, passes)
         if not _leaves(body) and all(
-            _constant(one) for one in tree.children if one is not body and isinstance(one, Tree)
+            _constant(one)
+            for one in tree.children
+            if one is not body and isinstance(one, SyntaxTree)
         ):
             raise Endless
 
-    def _pass(self, tree: Tree, body: Tree, again: Again) -> tuple[bool, bool]:
+    def _pass(self, tree: SyntaxTree, body: SyntaxTree, again: Again) -> tuple[bool, bool]:
         """One pass of a loop: whether it goes on, and whether something known may end it."""
         guessed = self._guessed_exits
         known = self._known_exits
@@ -311,7 +328,7 @@ class Control:
             open_ = self._guessed_exits > guessed and self._known_exits == known
         return goes_on, not (open_ or still)
 
-    def _left(self, place: Place, word: str, passes: int) -> None:
+    def _left(self, place: SourcePlace, word: str, passes: int) -> None:
         times = "once" if passes == 1 else f"{passes} times"
         self.note_at(
             place,
@@ -319,19 +336,19 @@ class Control:
             Effect.MOTIONS,
         )
 
-    def _one_more(self, tree: Tree) -> None:
+    def _one_more(self, tree: SyntaxTree) -> None:
         """A pass of a loop counts as a statement: an empty loop ends too."""
         self.statements += 1
         self._check_budget(tree)
 
-    def _check_budget(self, tree: Tree) -> None:
+    def _check_budget(self, tree: SyntaxTree) -> None:
         if self.statements > STATEMENTS_MAX:
             raise KrlRunError(
                 f"more than {STATEMENTS_MAX} statements: does a loop never end? {_ENDLESS}",
                 self.place(tree),
             )
 
-    def _switch(self, tree: Tree) -> None:
+    def _switch(self, tree: SyntaxTree) -> None:
         subject, *cases, default = tree.children
         before = self.memory.guesses
         value = self.memory.guess(self.expressions.value(subject), 0, self.place(tree))
@@ -346,38 +363,38 @@ class Control:
         if default is not None:
             self._branch(default.children[0], open_=open_)
 
-    def _exit(self, tree: Tree) -> None:
+    def _exit(self, tree: SyntaxTree) -> None:
         raise LoopExit
 
-    def _return_(self, tree: Tree) -> None:
+    def _return_(self, tree: SyntaxTree) -> None:
         raise Returned(
             None if tree.children[0] is None else self.expressions.value(tree.children[0])
         )
 
-    def _halt(self, tree: Tree) -> None:
+    def _halt(self, tree: SyntaxTree) -> None:
         self.stop(self.place(tree), "HALT")
         self.note(tree, "HALT waits for the operator: taken as no pause", Effect.TIMES)
 
-    def _const_vel(self, tree: Tree) -> None:
+    def _const_vel(self, tree: SyntaxTree) -> None:
         self.note(
             tree,
             "CONST_VEL isn't modelled: the tool accelerates and brakes within the range as well",
             Effect.SPEEDS,
         )
 
-    def _stop_when(self, tree: Tree) -> None:
+    def _stop_when(self, tree: SyntaxTree) -> None:
         self.note(tree, "STOP WHEN isn't followed: taken as not stopping", Effect.TIMES)
 
-    def _continue_(self, tree: Tree) -> None:
+    def _continue_(self, tree: SyntaxTree) -> None:
         """Keeps the advance run going: an output that follows is set without a stop."""
 
-    def _goto(self, tree: Tree) -> None:
+    def _goto(self, tree: SyntaxTree) -> None:
         raise Jump(str(tree.children[0]), self.place(tree))
 
-    def _label(self, tree: Tree) -> None:
+    def _label(self, tree: SyntaxTree) -> None:
         """A label alone does nothing."""
 
-    def _wait_seconds(self, tree: Tree) -> None:
+    def _wait_seconds(self, tree: SyntaxTree) -> None:
         seconds = self.expressions.number(tree.children[0], "the time of WAIT SEC")
         if seconds > WAIT_MAX:
             raise KrlRunError(
@@ -392,12 +409,12 @@ class Control:
         else:  # passed at once, as on the controller; yet the advance run stops
             self.stop(self.place(tree), f"WAIT SEC {seconds:g}")
 
-    def _wait(self, seconds: float, place: Place) -> None:
+    def _wait(self, seconds: float, place: SourcePlace) -> None:
         self.memory.arrived()
-        self.commands.append(Wait(seconds, place))
+        self.commands.append(StandStill(seconds, place))
         self._signals.stood(seconds, place)
 
-    def _wait_for(self, tree: Tree) -> None:
+    def _wait_for(self, tree: SyntaxTree) -> None:
         condition = tree.children[0]
         self._check_names(condition)
         for index, value in self._waited(condition, wanted=True):
@@ -422,10 +439,10 @@ class Control:
                 text = f"{_written(condition)}: nobody knows how long until then, taken as 0 s"
                 self.note_at(place, text, Effect.TIMES)
         self.memory.arrived()
-        self.commands.append(WaitFor(_written(condition), place))
+        self.commands.append(WaitForCondition(_written(condition), place))
         self._signals.moved()
 
-    def _blocked(self, tree: Tree, *, wanted: bool) -> bool:
+    def _blocked(self, tree: SyntaxTree, *, wanted: bool) -> bool:
         """Whether flags and variables, which only the program sets, keep a condition from what a
         wait wants of it; inputs and the state of the controller may come to it.
         """
@@ -448,7 +465,7 @@ class Control:
         holds = self.expressions.truth(tree, "the condition of WAIT FOR")
         return holds is not wanted and self.memory.guesses == before
 
-    def _is_own(self, tree: Tree) -> bool:
+    def _is_own(self, tree: SyntaxTree) -> bool:
         """Whether an expression reads flags and variables alone."""
         signals = self.expressions.signals
         outside = (*signals.groups, *signals.aliases)
@@ -456,7 +473,7 @@ class Control:
             name == FLAG or not (name.startswith("$") or name in outside) for name in _names(tree)
         )
 
-    def _settle(self, tree: Tree, *, wanted: bool) -> None:
+    def _settle(self, tree: SyntaxTree, *, wanted: bool) -> None:
         """Flags and variables hold what a wait that was taken as ended leaves no choice."""
         match tree.data:
             case "negated":
@@ -470,7 +487,7 @@ class Control:
             case "access" if self._is_own(tree):
                 self.memory.set(self.expressions.path(tree), wanted, self.place(tree))
 
-    def _timed(self, condition: Tree) -> float | None:
+    def _timed(self, condition: SyntaxTree) -> float | None:
         """Seconds until a timer that was set and started just before has passed a bound; None where
         the condition is another one, or time has passed since.
         """
@@ -490,12 +507,12 @@ class Control:
         if clock.runs_at is None:
             return None
         since = self.commands[max(clock.set_at, clock.runs_at) :]
-        if any(isinstance(one, Motion | SplineBlock | WaitFor) for one in since):
+        if any(isinstance(one, Motion | SplineBlock | WaitForCondition) for one in since):
             return None
-        waited = sum(one.seconds for one in since if isinstance(one, Wait))
+        waited = sum(one.seconds for one in since if isinstance(one, StandStill))
         return (bound - clock.value) * _TICK - waited
 
-    def _waited(self, tree: Tree, *, wanted: bool) -> list[tuple[int, bool]]:
+    def _waited(self, tree: SyntaxTree, *, wanted: bool) -> list[tuple[int, bool]]:
         """Inputs that a condition which holds leaves no choice."""
         match tree.data:
             case "negated":
@@ -511,7 +528,7 @@ class Control:
                 return self._waited_signal(tree, wanted=wanted)
         return []
 
-    def _waited_signal(self, tree: Tree, *, wanted: bool) -> list[tuple[int, bool]]:
+    def _waited_signal(self, tree: SyntaxTree, *, wanted: bool) -> list[tuple[int, bool]]:
         """The same of an input, or of those that a cyclical flag follows."""
         (name, index), *rest = self.expressions.path(tree)
         if name == INPUT and index is not None and not rest:
@@ -520,7 +537,7 @@ class Control:
             return self._waited(self._flags[index[0]], wanted=wanted)
         return []
 
-    def _waited_compared(self, tree: Tree, *, wanted: bool) -> list[tuple[int, bool]]:
+    def _waited_compared(self, tree: SyntaxTree, *, wanted: bool) -> list[tuple[int, bool]]:
         """The same of a comparison with TRUE or FALSE, or of a group of inputs with a number."""
         left, sign, right = tree.children
         if right.data in ("true", "false"):
@@ -537,7 +554,7 @@ class Control:
             return []
         return [(n, bool(int(number) >> k & 1)) for k, n in enumerate(group.numbers)]
 
-    def _waited_one(self, sides: Sequence[Tree], *, wanted: bool) -> list[tuple[int, bool]]:
+    def _waited_one(self, sides: Sequence[SyntaxTree], *, wanted: bool) -> list[tuple[int, bool]]:
         """Inputs of that one of two conditions which ends a wait: of one that holds as they are
         given, else of the first that may.
         """
@@ -549,7 +566,7 @@ class Control:
 
     def _check_names(self, tree: Any) -> None:
         """Note a name in a condition that nothing is known of."""
-        if isinstance(tree, Tree) and tree.data == "access":
+        if isinstance(tree, SyntaxTree) and tree.data == "access":
             name = str(tree.children[0])
             signals = self.expressions.signals
             memory = self.memory
@@ -557,42 +574,46 @@ class Control:
             if not declared and not name.startswith("$"):
                 text = f"{name} isn't declared in the files: the wait is taken as one that ends"
                 self.note(tree, text, Effect.TIMES)
-        for child in tree.children if isinstance(tree, Tree) else ():
+        for child in tree.children if isinstance(tree, SyntaxTree) else ():
             self._check_names(child)
 
 
-def _is_truth_comparison(compared: Tree) -> bool:
+def _is_truth_comparison(compared: SyntaxTree) -> bool:
     """Whether a comparison is one with TRUE or FALSE."""
     return compared.children[2].data in ("true", "false")
 
 
-def _holds_with_left(compared: Tree) -> bool:
+def _holds_with_left(compared: SyntaxTree) -> bool:
     """Of a comparison with TRUE or FALSE: whether it holds where its left side does."""
     _, sign, right = compared.children
     return (str(sign) == "==") is (right.data == "true")
 
 
-def _accesses(tree: Tree) -> list[Tree]:
+def _accesses(tree: SyntaxTree) -> list[SyntaxTree]:
     """What an expression reads."""
     if tree.data == "access":
         return [tree]
-    return [found for one in tree.children if isinstance(one, Tree) for found in _accesses(one)]
+    return [
+        found for one in tree.children if isinstance(one, SyntaxTree) for found in _accesses(one)
+    ]
 
 
-def _calls(tree: Tree) -> bool:
+def _calls(tree: SyntaxTree) -> bool:
     """Whether an expression calls a function."""
-    return tree.data == "call" or any(_calls(one) for one in tree.children if isinstance(one, Tree))
+    return tree.data == "call" or any(
+        _calls(one) for one in tree.children if isinstance(one, SyntaxTree)
+    )
 
 
-def _names(tree: Tree) -> set[str]:
+def _names(tree: SyntaxTree) -> set[str]:
     """Names of what an expression reads."""
     own = {str(tree.children[0])} if tree.data == "access" else set()
-    return own.union(*(_names(one) for one in tree.children if isinstance(one, Tree)))
+    return own.union(*(_names(one) for one in tree.children if isinstance(one, SyntaxTree)))
 
 
 def _written(tree: Any) -> str:
     """An expression as text, for people."""
-    if not isinstance(tree, Tree):
+    if not isinstance(tree, SyntaxTree):
         return "" if tree is None else str(tree)
     if tree.data in ("true", "false"):
         return tree.data.upper()
@@ -604,27 +625,27 @@ def _written(tree: Any) -> str:
     return (" " if tree.data == "negated" else "").join(parts)
 
 
-def _label_in(body: Tree, name: str) -> int | None:
+def _label_in(body: SyntaxTree, name: str) -> int | None:
     """The place of a label among the statements of a body."""
     labels = (k for k, one in enumerate(body.children) if one.data == "label")
     return next((k for k in labels if str(body.children[k].children[0]) == name), None)
 
 
-def _constant(tree: Tree) -> bool:
+def _constant(tree: SyntaxTree) -> bool:
     """Whether an expression names nothing: WHILE TRUE, WHILE 1==1."""
     if tree.data in ("access", "call"):
         return False
-    return all(_constant(one) for one in tree.children if isinstance(one, Tree))
+    return all(_constant(one) for one in tree.children if isinstance(one, SyntaxTree))
 
 
-def _ways_out(tree: Tree) -> bool:
+def _ways_out(tree: SyntaxTree) -> bool:
     """Whether a jump, a return or an exit stands in a statement."""
     if tree.data in ("goto", "return_", "exit"):
         return True
-    return any(_ways_out(one) for one in tree.children if isinstance(one, Tree))
+    return any(_ways_out(one) for one in tree.children if isinstance(one, SyntaxTree))
 
 
-def _leaves(body: Tree) -> bool:
+def _leaves(body: SyntaxTree) -> bool:
     """Whether a loop may be left from its body: by an EXIT that stands in no loop inside, by a jump
     or by a RETURN.
     """
@@ -633,12 +654,12 @@ def _leaves(body: Tree) -> bool:
         child.data in ("exit", "goto", "return_")
         or (_leaves(child) if child.data not in inner else _ways_far(child))
         for child in body.children
-        if isinstance(child, Tree)
+        if isinstance(child, SyntaxTree)
     )
 
 
-def _ways_far(tree: Tree) -> bool:
+def _ways_far(tree: SyntaxTree) -> bool:
     """Whether a jump or a return stands in a statement: an EXIT leaves the loop inside alone."""
     if tree.data in ("goto", "return_"):
         return True
-    return any(_ways_far(one) for one in tree.children if isinstance(one, Tree))
+    return any(_ways_far(one) for one in tree.children if isinstance(one, SyntaxTree))

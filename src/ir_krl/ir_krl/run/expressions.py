@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from ir_krl.errors import KrlRunError, Place
-from ir_krl.language import Tree, place_of
+from ir_krl.errors import KrlRunError, SourcePlace
+from ir_krl.language import SyntaxTree, place_of
 from ir_krl.run.memory import SINGLE, TIMER, Memory, Signals, Step
 from ir_krl.run.system import STOPS_ADVANCE
 from ir_krl.run.values import (
@@ -45,7 +45,7 @@ _LOGICAL: dict[str, Callable[[Any, Any], Any]] = {
     "EXOR": operator.xor,
 }
 
-Caller = Callable[[str, list[Any], Place], Value]
+Caller = Callable[[str, list[Any], SourcePlace], Value]
 """Calls a function: name, trees of its arguments, place."""
 
 
@@ -58,21 +58,21 @@ class Expressions:
     call: Caller
     file: str = ""
 
-    def value(self, tree: Tree) -> Value:
+    def value(self, tree: SyntaxTree) -> Value:
         """The value of an expression. Raises KrlRunError with the place."""
         found: Value = getattr(self, f"_{tree.data}")(tree, place_of(tree, self.file))
         return found
 
-    def number(self, tree: Tree, what: str) -> float:
+    def number(self, tree: SyntaxTree, what: str) -> float:
         """A number [as written]."""
         return number(self.value(tree), what, place_of(tree, self.file))
 
-    def truth(self, tree: Tree, what: str) -> bool:
+    def truth(self, tree: SyntaxTree, what: str) -> bool:
         """TRUE or FALSE."""
         place = place_of(tree, self.file)
         return truth(self.memory.guess(self.value(tree), False, place), what, place)
 
-    def path(self, access: Tree) -> tuple[Step, ...]:
+    def path(self, access: SyntaxTree) -> tuple[Step, ...]:
         """Names and indices of an access; a signal's name becomes what it stands for."""
         steps: list[Step] = []
         for name, index in zip(access.children[::2], access.children[1::2], strict=True):
@@ -81,7 +81,7 @@ class Expressions:
             self.signals.aliases.get(steps[0][0], tuple(steps)) if len(steps) == 1 else tuple(steps)
         )
 
-    def index(self, tree: Tree) -> tuple[int, ...] | None:
+    def index(self, tree: SyntaxTree) -> tuple[int, ...] | None:
         """Whole numbers of an index; None for []."""
         place = place_of(tree, self.file)
         guess = self.memory.guess
@@ -92,12 +92,12 @@ class Expressions:
         )
         return found or None
 
-    def bound(self, tree: Tree) -> int:
+    def bound(self, tree: SyntaxTree) -> int:
         """A bound of FOR; one pass is followed where it isn't known."""
         place = place_of(tree, self.file)
         return integer(self.memory.guess(self.value(tree), 1, place), "a bound of FOR", place)
 
-    def _access(self, tree: Tree, place: Place) -> Value:
+    def _access(self, tree: SyntaxTree, place: SourcePlace) -> Value:
         path = self.path(tree)
         name, index = path[0]
         if index is None and name in self.signals.groups:
@@ -110,11 +110,11 @@ class Expressions:
             self.signals.stands_still(index[0], place)
         return self.memory.get(path, place)
 
-    def _call(self, tree: Tree, place: Place) -> Value:
+    def _call(self, tree: SyntaxTree, place: SourcePlace) -> Value:
         name, *arguments = tree.children
         return self.call(str(name), arguments, place)
 
-    def _number(self, tree: Tree, place: Place) -> Value:
+    def _number(self, tree: SyntaxTree, place: SourcePlace) -> Value:
         text = str(tree.children[0])
         if text.isdigit() and len(text) > DIGITS_MAX:
             raise KrlRunError(
@@ -122,19 +122,19 @@ class Expressions:
             )
         return in_range(int(text) if text.isdigit() else float(text), place)
 
-    def _true(self, tree: Tree, place: Place) -> Value:
+    def _true(self, tree: SyntaxTree, place: SourcePlace) -> Value:
         return True
 
-    def _false(self, tree: Tree, place: Place) -> Value:
+    def _false(self, tree: SyntaxTree, place: SourcePlace) -> Value:
         return False
 
-    def _text(self, tree: Tree, place: Place) -> Value:
+    def _text(self, tree: SyntaxTree, place: SourcePlace) -> Value:
         return str(tree.children[0])[1:-1]
 
-    def _enum_value(self, tree: Tree, place: Place) -> Value:
+    def _enum_value(self, tree: SyntaxTree, place: SourcePlace) -> Value:
         return Symbol(str(tree.children[0])[1:].strip())
 
-    def _bits(self, tree: Tree, place: Place) -> Value:
+    def _bits(self, tree: SyntaxTree, place: SourcePlace) -> Value:
         text = str(tree.children[0])[1:-1]
         try:
             bits = int(text[1:], 2 if text[0] == "B" else 16)
@@ -143,7 +143,7 @@ class Expressions:
         signed = INT_MAX < bits < 1 << _BITS  # the highest bit is the sign
         return in_range(bits - (1 << _BITS) if signed else bits, place)
 
-    def _aggregate(self, tree: Tree, place: Place) -> Value:
+    def _aggregate(self, tree: SyntaxTree, place: SourcePlace) -> Value:
         kind, *fields = tree.children
         values: dict[str, Value] = {}
         for field in fields:
@@ -153,13 +153,13 @@ class Expressions:
             values[str(name)] = copied(self.value(expression))
         return Structure(values, str(kind) if kind is not None else "")
 
-    def _signed(self, tree: Tree, place: Place) -> Value:
+    def _signed(self, tree: SyntaxTree, place: SourcePlace) -> Value:
         sign, operand = tree.children
         value = self.memory.guess(self.value(operand), 0, place)
         number(value, "what follows the sign", place)
         return in_range(-value, place) if sign == "-" else value  # type: ignore[operator]
 
-    def _negated(self, tree: Tree, place: Place) -> Value:
+    def _negated(self, tree: SyntaxTree, place: SourcePlace) -> Value:
         word, operand = tree.children
         value = self.value(operand)
         value = self.memory.guess(value, 0 if word == "B_NOT" else False, place)
@@ -167,12 +167,12 @@ class Expressions:
             return ~integer(value, "what B_NOT is applied to", place)
         return not truth(value, "what NOT is applied to", place)
 
-    def _added(self, tree: Tree, place: Place) -> Value:
+    def _added(self, tree: SyntaxTree, place: SourcePlace) -> Value:
         left, sign, right = tree.children
         a, b = self._numbers(left, right, str(sign))
         return in_range(a + b if sign == "+" else a - b, place)
 
-    def _multiplied(self, tree: Tree, place: Place) -> Value:
+    def _multiplied(self, tree: SyntaxTree, place: SourcePlace) -> Value:
         left, sign, right = tree.children
         a, b = self._numbers(left, right, str(sign))
         if sign == "*":
@@ -186,7 +186,9 @@ class Expressions:
             return in_range(whole, place)
         return in_range(a / b, place)
 
-    def _numbers(self, left: Tree, right: Tree, sign: str) -> tuple[int | float, int | float]:
+    def _numbers(
+        self, left: SyntaxTree, right: SyntaxTree, sign: str
+    ) -> tuple[int | float, int | float]:
         values = []
         for side in (left, right):
             value = _counted(self.memory.guess(self.value(side), 0, place_of(side, self.file)))
@@ -194,7 +196,7 @@ class Expressions:
             values.append(value)
         return _alike(*values)
 
-    def _joined(self, tree: Tree, place: Place) -> Value:
+    def _joined(self, tree: SyntaxTree, place: SourcePlace) -> Value:
         """AND, OR, EXOR of truth values; B_AND, B_OR, B_EXOR of the bits of whole numbers."""
         left, word, right = tree.children
         otherwise: Value = 0 if word.startswith("B_") else False
@@ -210,7 +212,7 @@ class Expressions:
             place,
         )
 
-    def _compared(self, tree: Tree, place: Place) -> Value:
+    def _compared(self, tree: SyntaxTree, place: SourcePlace) -> Value:
         left, sign, right = tree.children
         a = self.value(left)
         b = self.value(right)
@@ -224,7 +226,7 @@ class Expressions:
             number(a, f"the left of {sign}", place), number(b, f"the right of {sign}", place)
         )
 
-    def _composed(self, tree: Tree, place: Place) -> Value:
+    def _composed(self, tree: SyntaxTree, place: SourcePlace) -> Value:
         first, second = tree.children
         a = self.value(first)
         b = self.value(second)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import TypeGuard
 
 from ir_description.poses import inverse
-from ir_krl.errors import KrlRunError, Place
+from ir_krl.errors import KrlRunError, SourcePlace
 from ir_krl.run.memory import Memory, Step
 from ir_krl.run.notes import Effect
 from ir_krl.run.system import DEFAULTS, FULL, NULL, all_axes
@@ -77,7 +77,7 @@ class Library:
 
     def __init__(self, memory: Memory) -> None:
         self._memory = memory
-        self._named: dict[str, Callable[[Arguments, Place], Value]] = {
+        self._named: dict[str, Callable[[Arguments, SourcePlace], Value]] = {
             "BAS": self._bas,
             "SVEL_JOINT": self._joint_velocity,
             "SACC_JOINT": self._joint_acceleration,
@@ -104,7 +104,7 @@ class Library:
         known = WITHOUT_EFFECT | STOPPING | FILLING
         return name in self._named or name in _MATHEMATICS or name in known
 
-    def call(self, name: str, arguments: Arguments, place: Place) -> Value:
+    def call(self, name: str, arguments: Arguments, place: SourcePlace) -> Value:
         """Its value; 0 where it has none. Raises KrlRunError."""
         if name in FILLING:
             text = f"{name} isn't followed: what it would fill in is taken as it stands"
@@ -123,7 +123,7 @@ class Library:
                 f"{name} can't be computed of {', '.join(f'{one:g}' for one in numbers)}", place
             ) from None
 
-    def _bas(self, arguments: Arguments, place: Place) -> Value:  # noqa: C901, PLR0912
+    def _bas(self, arguments: Arguments, place: SourcePlace) -> Value:  # noqa: C901, PLR0912
         command = _first(arguments, "BAS", place)
         value = arguments[1] if len(arguments) > 1 else None
         if not isinstance(command, Symbol):
@@ -189,7 +189,7 @@ class Library:
         if used:
             self._memory.chosen[used] = self._memory.assumed.get(name)
         given = value if isinstance(value, int | float) else DEFAULTS[name]
-        return number(given, name, Place())
+        return number(given, name, SourcePlace())
 
     def _initialised(self) -> None:
         """BAS(#INITMOV): speeds, approximation, tool 1, base 0 as $config.dat has them."""
@@ -215,7 +215,7 @@ class Library:
         self._take_base(0)
         self._set("$TOOL", self._tool(1))
 
-    def _axis_data(self, place: Place) -> None:
+    def _axis_data(self, place: SourcePlace) -> None:
         """What PDAT_ACT says of an axis motion: an APO_MODE #CDIS means mm, else per cent."""
         self._set("$ACC_AXIS", min(self._noted("PDAT_ACT", "ACC", FULL, place), FULL))
         distance = self._noted("PDAT_ACT", "APO_DIST", 0.0, place)
@@ -225,7 +225,7 @@ class Library:
         else:
             self._set("$APO.CPTP", min(distance, FULL))
 
-    def _tool_data(self, place: Place) -> None:
+    def _tool_data(self, place: SourcePlace) -> None:
         """What LDAT_ACT says of a motion of the tool."""
         self._tool_acceleration(self._noted("LDAT_ACT", "ACC", FULL, place))
         self._set("$APO.CDIS", self._noted("LDAT_ACT", "APO_DIST", 0.0, place))
@@ -233,7 +233,7 @@ class Library:
         self._set("$ORI_TYPE", _field([noted], "ORI_TYP", Symbol("VAR")))
         self._set("$CIRC_TYPE", _field([noted], "CIRC_TYP", Symbol("BASE")))
 
-    def _own(self, name: str, place: Place) -> Value | None:
+    def _own(self, name: str, place: SourcePlace) -> Value | None:
         return self._memory.get(((name, None),), place) if self._memory.has(name) else None
 
     def _tool_speed(self, velocity: float) -> None:
@@ -246,7 +246,7 @@ class Library:
         known = self._memory.peek("$VEL_MA")
         if not _holds(known, "CP"):
             return otherwise
-        return number(known.fields["CP"], "$VEL_MA.CP", Place())
+        return number(known.fields["CP"], "$VEL_MA.CP", SourcePlace())
 
     def _tool_acceleration(self, share: float) -> None:
         """$ACC of the tool as BAS sets it, `share` [%] of the figures of $config.dat."""
@@ -258,7 +258,7 @@ class Library:
             full = self._default(name, f"$ACC.{part}")
             self._set(f"$ACC.{part}", full * min(share, FULL) / FULL)
 
-    def _frames(self, place: Place) -> None:
+    def _frames(self, place: SourcePlace) -> None:
         """Tool, load and base that the inline form's FDAT_ACT names."""
         noted = self._own("FDAT_ACT", place)
         if not isinstance(noted, Structure):
@@ -270,14 +270,14 @@ class Library:
             raise KrlRunError(f"IPO_FRAME is {kind_of(mode)}: it is #BASE or #TCP", place)
         self._set("$IPO_MODE", mode)
 
-    def _take_tool(self, index: int, place: Place) -> None:
+    def _take_tool(self, index: int, place: SourcePlace) -> None:
         self._set("$TOOL", self._tool(index))
         self._set("$LOAD", self._load(index, place))
 
     def _take_base(self, index: int) -> None:
         self._set("$BASE", self._base(index))
 
-    def _form_tool(self, arguments: Arguments, place: Place) -> Value:
+    def _form_tool(self, arguments: Arguments, place: SourcePlace) -> Value:
         return self._tool(round(_component(arguments, "TOOL_NO", place)))
 
     def _tool(self, index: int) -> Value:
@@ -293,7 +293,7 @@ class Library:
         self._memory.chosen[used] = self._memory.assumed.get(f"{name}[{index}]")
         return Structure(dict(NULL)) if value is None else copied(value)
 
-    def _noted(self, variable: str, component: str, otherwise: float, place: Place) -> float:
+    def _noted(self, variable: str, component: str, otherwise: float, place: SourcePlace) -> float:
         """A number of what an inline form left in PDAT_ACT, LDAT_ACT or FDAT_ACT."""
         noted = self._memory.get(((variable, None),), place) if self._memory.has(variable) else None
         if not isinstance(noted, Structure) or component not in noted.fields:
@@ -309,10 +309,10 @@ class Library:
         path: tuple[Step, ...] = (
             ((variable, None), (component, None)) if component else ((variable, None),)
         )
-        self._memory.set(path, value, Place())
+        self._memory.set(path, value, SourcePlace())
         self._memory.take_chosen(name)
 
-    def _state(self, arguments: Arguments, place: Place) -> Value:
+    def _state(self, arguments: Arguments, place: SourcePlace) -> Value:
         """VARSTATE("NAME"): whether a variable has a value."""
         name = _first(arguments, "VARSTATE", place)
         if not isinstance(name, str):
@@ -323,7 +323,7 @@ class Library:
             return Symbol("INITIALIZED")
         return Symbol("DECLARED" if self._memory.declared(name.upper()) else "UNDEFINED")
 
-    def _joint_velocity(self, arguments: Arguments, place: Place) -> Value:
+    def _joint_velocity(self, arguments: Arguments, place: SourcePlace) -> Value:
         return self._axis_speed(number(_first(arguments, "SVEL_JOINT", place), "speed", place))
 
     def _axis_speed(self, percent: float) -> float:
@@ -334,12 +334,12 @@ class Library:
         self._memory.chosen["$VEL_AXIS"] = chosen  # of an assignment to one of the axes
         return share
 
-    def _joint_acceleration(self, arguments: Arguments, place: Place) -> Value:
+    def _joint_acceleration(self, arguments: Arguments, place: SourcePlace) -> Value:
         share = min(_component(arguments, "ACC", place), FULL)
         self._set("$ACC_AXIS", share)
         return share
 
-    def _tool_velocity(self, arguments: Arguments, place: Place) -> Value:
+    def _tool_velocity(self, arguments: Arguments, place: SourcePlace) -> Value:
         """SVEL_CP: the speed of the tool, and as much of the axes' as the form's data say."""
         share = number(_field(arguments, "AXIS_VEL", FULL), "AXIS_VEL", place)
         self._set("$VEL_AXIS", min(share, FULL))
@@ -347,7 +347,7 @@ class Library:
         turning = self._default("DEF_VEL_ORIS", "$VEL.ORI1")
         return _turning_too(min(speed, self._fastest(speed)), turning)
 
-    def _path_acceleration(self, arguments: Arguments, place: Place) -> Value:
+    def _path_acceleration(self, arguments: Arguments, place: SourcePlace) -> Value:
         own = _component(arguments, "ACC", place)
         percent = min(number(_field(arguments, "AXIS_ACC", own), "AXIS_ACC", place), FULL)
         self._set("$ACC_AXIS", percent)
@@ -356,7 +356,7 @@ class Library:
         along = self._default("DEF_ACC_CP", "$ACC.CP") * share
         return _turning_too(along, turning)
 
-    def _axis_approximation(self, arguments: Arguments, place: Place) -> Value:
+    def _axis_approximation(self, arguments: Arguments, place: SourcePlace) -> Value:
         """SAPO_PTP: millimetres, and a share of the motion where APO_MODE is #CPTP."""
         distance = _component(arguments, "APO_DIST", place)
         mode = _field(arguments, "APO_MODE", "")
@@ -365,7 +365,7 @@ class Library:
         share = FULL if mode else self._default("DEF_APO_CPTP", "$APO.CPTP")
         return Structure({"CDIS": distance, "CPTP": share})
 
-    def _load(self, index: int, place: Place) -> Value:
+    def _load(self, index: int, place: SourcePlace) -> Value:
         """LOAD_DATA of a tool; a mass of -1, as the machine data have it, where nothing is said."""
         value = self._memory.peek("LOAD_DATA", index)
         if index > 0 and _holds(value, "M"):
@@ -381,17 +381,17 @@ def _turning_too(along: float, turning: float) -> Structure:
     return Structure({"CP": along, "ORI1": turning, "ORI2": turning})
 
 
-def _given(value: Value | None, what: str, place: Place) -> Value:
+def _given(value: Value | None, what: str, place: SourcePlace) -> Value:
     if value is None:
         raise KrlRunError(f"{what} lacks an argument", place)
     return value
 
 
-def _first(arguments: Arguments, what: str, place: Place) -> Value:
+def _first(arguments: Arguments, what: str, place: SourcePlace) -> Value:
     return _given(arguments[0] if arguments else None, what, place)
 
 
-def _whole(arguments: Arguments, what: str, place: Place) -> int:
+def _whole(arguments: Arguments, what: str, place: SourcePlace) -> int:
     return integer(_first(arguments, what, place), f"the argument of {what}", place)
 
 
@@ -405,7 +405,7 @@ def _holds(value: Value | None, name: str) -> TypeGuard[Structure]:
     return isinstance(value, Structure) and name in value.fields
 
 
-def _component(arguments: Arguments, name: str, place: Place) -> float:
+def _component(arguments: Arguments, name: str, place: SourcePlace) -> float:
     """The same as a number. Raises KrlRunError where no argument has it."""
     if not any(_holds(value, name) for value in arguments):
         raise KrlRunError(

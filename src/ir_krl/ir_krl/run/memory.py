@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import Any
 
-from ir_krl.errors import KrlRunError, Place
+from ir_krl.errors import KrlRunError, SourcePlace
 from ir_krl.run.notes import Effect
 from ir_krl.run.system import Assumption
 from ir_krl.run.values import (
@@ -52,7 +52,7 @@ class Scope:
 
 Watched = dict[tuple[int, str], tuple[dict[str, Value], Value | None]]
 """What variables held when they were set first, by the memory that holds them and their name."""
-Noted = Callable[[Place, str, Effect], None]
+Noted = Callable[[SourcePlace, str, Effect], None]
 """Hears what is assumed: place, sentence, what it could change."""
 
 
@@ -81,7 +81,7 @@ class Memory:
     settings: dict[str, Value] = field(default_factory=dict)
     beside: set[str] = field(default_factory=set)
     ahead: bool = False
-    delivered: dict[str, Place] = field(default_factory=dict)
+    delivered: dict[str, SourcePlace] = field(default_factory=dict)
     types: dict[str, Mapping[str, str]] = field(default_factory=lambda: dict(TYPES))
 
     def enter(self, values: dict[str, Value], names: Iterable[str]) -> None:
@@ -164,7 +164,7 @@ class Memory:
         if value is not None:
             self.shared[name] = value
 
-    def guess(self, value: Value, otherwise: Value, place: Place) -> Value:
+    def guess(self, value: Value, otherwise: Value, place: SourcePlace) -> Value:
         """The value, or where there is none `otherwise`, which is said."""
         if not isinstance(value, Unknown):
             return value
@@ -212,7 +212,7 @@ class Memory:
         """A motion is handed on, while the advance run goes ahead of it."""
         self.ahead = self.peek("$ADVANCE") != 0
 
-    def override_set(self, place: Place) -> None:
+    def override_set(self, place: SourcePlace) -> None:
         """Say that $OV_PRO, which acts at once, is set while motions before are still driven."""
         if self.ahead:
             text = (
@@ -221,7 +221,7 @@ class Memory:
             )
             self.noted(place, text, Effect.SPEEDS)
 
-    def _guessed(self, name: str, index: tuple[int, ...] | None, place: Place) -> None:
+    def _guessed(self, name: str, index: tuple[int, ...] | None, place: SourcePlace) -> None:
         """Say that a value which isn't the program's is used."""
         if index is not None and len(index) == 1 and f"{name}[{index[0]}]" in self.assumed:
             name = f"{name}[{index[0]}]"
@@ -234,7 +234,7 @@ class Memory:
         else:
             self.noted(place, assumed.text, assumed.effect)
 
-    def get(self, path: tuple[Step, ...], place: Place) -> Value:
+    def get(self, path: tuple[Step, ...], place: SourcePlace) -> Value:
         """The value at a path such as XP1.X or BASE_DATA[2]. Raises KrlRunError."""
         (name, index), *rest = path
         home = self._home(name)
@@ -259,7 +259,7 @@ class Memory:
             value = _element(value.fields.get(part, Unknown(written)), written, part_index, place)
         return value
 
-    def set(self, path: tuple[Step, ...], value: Value, place: Place) -> None:
+    def set(self, path: tuple[Step, ...], value: Value, place: SourcePlace) -> None:
         """Put a copy of `value` there; variables, elements and components are made where they
         lack.
         """
@@ -361,11 +361,11 @@ def _merged(before: Value | None, value: Value, kind: str, types: Types) -> Valu
     if isinstance(before, float) and isinstance(new, int) and not isinstance(new, bool):
         return real(new)
     if isinstance(before, int) and not isinstance(before, bool) and isinstance(new, float):
-        return in_range(rounded(new), Place())
+        return in_range(rounded(new), SourcePlace())
     return new
 
 
-def _array_at(holder: dict[str, Value], name: str, kind: str, place: Place) -> Array:
+def _array_at(holder: dict[str, Value], name: str, kind: str, place: SourcePlace) -> Array:
     """The array of a name, made where there is none. Raises KrlRunError."""
     held = holder.get(name)
     if held is None or isinstance(held, Unknown):
@@ -376,7 +376,7 @@ def _array_at(holder: dict[str, Value], name: str, kind: str, place: Place) -> A
 
 
 def _structure_at(
-    elements: dict[Any, Value], key: Any, name: str, kind: str, place: Place
+    elements: dict[Any, Value], key: Any, name: str, kind: str, place: SourcePlace
 ) -> Structure:
     """The structure at a key, made where there is none. Raises KrlRunError."""
     held = elements.get(key)
@@ -387,7 +387,9 @@ def _structure_at(
     return held
 
 
-def _with_letter(text: str, name: str, index: tuple[int, ...], letter: Value, place: Place) -> str:
+def _with_letter(
+    text: str, name: str, index: tuple[int, ...], letter: Value, place: SourcePlace
+) -> str:
     """A text with another letter at an index from 1; blanks fill what lacks before. Raises
     KrlRunError.
     """
@@ -398,7 +400,7 @@ def _with_letter(text: str, name: str, index: tuple[int, ...], letter: Value, pl
     return padded[:at] + letter + padded[at + 1 :]
 
 
-def _element(value: Value, name: str, index: tuple[int, ...] | None, place: Place) -> Value:
+def _element(value: Value, name: str, index: tuple[int, ...] | None, place: SourcePlace) -> Value:
     if index is None:
         return value
     written = f"{name}[{', '.join(map(str, index))}]"
@@ -465,14 +467,14 @@ class Signals:
     memory: Memory
     inputs: Mapping[int, bool]
     noted: Noted
-    stops: Callable[[Place, str], None] = lambda place, name: None
+    stops: Callable[[SourcePlace, str], None] = lambda place, name: None
     expected: dict[int, bool] = field(default_factory=dict)
     aliases: dict[str, tuple[Step, ...]] = field(default_factory=dict)
     groups: dict[str, SignalRange] = field(default_factory=dict)
     pulses: dict[int, Pulse] = field(default_factory=dict)
     cyclic: dict[int, Callable[[], bool]] = field(default_factory=dict)
 
-    def pulse(self, index: int, pulse: Pulse, place: Place) -> None:
+    def pulse(self, index: int, pulse: Pulse, place: SourcePlace) -> None:
         """PULSE has set an output: it goes back as time passes."""
         self.memory.set(((OUTPUT, (index,)),), pulse.level, place)
         self.pulses[index] = pulse
@@ -481,7 +483,7 @@ class Signals:
         """A motion, or a wait of unknown length, has passed."""
         self.pulses = {n: replace(one, moved=True) for n, one in self.pulses.items()}
 
-    def stood(self, seconds: float, place: Place) -> None:
+    def stood(self, seconds: float, place: SourcePlace) -> None:
         """A wait of known length has passed: pulses that it outlasts are over."""
         for index, one in list(self.pulses.items()):
             self.pulses[index] = replace(one, left=one.left - seconds)
@@ -489,7 +491,7 @@ class Signals:
                 del self.pulses[index]
                 self.memory.set(((OUTPUT, (index,)),), not one.level, place)
 
-    def read(self, name: str, index: int, place: Place) -> bool:
+    def read(self, name: str, index: int, place: SourcePlace) -> bool:
         """One signal or flag; what isn't known is FALSE. Raises KrlRunError."""
         if name in (INPUT, OUTPUT):
             self.stops(place, f"{name}[{index}]")
@@ -517,13 +519,13 @@ class Signals:
             self.noted(place, text, Effect.MOTIONS)
         return held
 
-    def stands_still(self, index: int, place: Place) -> None:
+    def stands_still(self, index: int, place: SourcePlace) -> None:
         """A timer is read: its time doesn't pass."""
         self.memory.guesses += 1
         text = f"$TIMER[{index}] stands still: no time passes for a timer"
         self.noted(place, text, Effect.MOTIONS)
 
-    def _input(self, index: int, place: Place) -> bool:
+    def _input(self, index: int, place: SourcePlace) -> bool:
         if index in self.inputs:
             return self.inputs[index]
         if index in self.expected:
@@ -533,12 +535,12 @@ class Signals:
         self.noted(place, text, Effect.MOTIONS)
         return False
 
-    def group_value(self, name: str, place: Place) -> int:
+    def group_value(self, name: str, place: SourcePlace) -> int:
         """The number of a group."""
         group = self.groups[name]
         return sum(self.read(group.kind, n, place) << k for k, n in enumerate(group.numbers))
 
-    def group_bits(self, name: str, value: Value, place: Place) -> list[tuple[int, bool]]:
+    def group_bits(self, name: str, value: Value, place: SourcePlace) -> list[tuple[int, bool]]:
         """Outputs of a group and what they are set to. Raises KrlRunError for a number that it
         can't hold.
         """
@@ -553,7 +555,7 @@ class Signals:
         return [(n, bool(wanted >> k & 1)) for k, n in enumerate(group.numbers)]
 
     def declare(
-        self, name: str, first: tuple[Step, ...], last: tuple[Step, ...] | None, place: Place
+        self, name: str, first: tuple[Step, ...], last: tuple[Step, ...] | None, place: SourcePlace
     ) -> None:
         """SIGNAL name first [TO last]. Raises KrlRunError for a group that makes no sense."""
         if last is None:

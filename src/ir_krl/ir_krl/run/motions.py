@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar, get_args
 
-from ir_krl.errors import KrlRunError, Place
-from ir_krl.language import Tree, place_of
+from ir_krl.errors import KrlRunError, SourcePlace
+from ir_krl.language import SyntaxTree, place_of
 from ir_krl.run.commands import (
     END_OF_LAST,
     Blend,
@@ -74,7 +74,7 @@ from ir_values.arrays import FloatArray
 class Assigning(Control):
     """Sets values and outputs; what signals are called is known to `_signals`."""
 
-    def _assignment(self, tree: Tree) -> None:
+    def _assignment(self, tree: SyntaxTree) -> None:
         access, expression = tree.children
         path = self.expressions.path(access)
         (name, index), where = path[0], self.place(tree)
@@ -103,7 +103,7 @@ class Assigning(Control):
         for other, follows in mode_variables(name, value).items():
             self.memory.set(((other, None),), follows, where)
 
-    def _output_assigned(self, name: str, number: int, value: Value, where: Place) -> None:
+    def _output_assigned(self, name: str, number: int, value: Value, where: SourcePlace) -> None:
         level = self.memory.guess(value, False, where)
         if not isinstance(level, bool):
             raise KrlRunError(f"{name}[{number}] is set to {kind_of(level)}", where)
@@ -119,7 +119,7 @@ class Assigning(Control):
             begun = at if clock.runs_at is None else clock.runs_at
             self._timers[index] = replace(clock, runs_at=None if value else begun)
 
-    def _follows(self, index: int, expression: Tree) -> bool:
+    def _follows(self, index: int, expression: SyntaxTree) -> bool:
         """Whether a cyclical flag is evaluated anew from its assignment on: of signals alone."""
         self._flags.pop(index, None)
         self._signals.cyclic.pop(index, None)
@@ -130,7 +130,7 @@ class Assigning(Control):
         self._signals.cyclic[index] = anew
         return True
 
-    def _of_signals(self, tree: Tree) -> bool:
+    def _of_signals(self, tree: SyntaxTree) -> bool:
         """Whether an expression hangs on inputs and outputs, and on nothing else."""
         if tree.data == "access":
             name = str(tree.children[0])
@@ -143,10 +143,10 @@ class Assigning(Control):
         if tree.data == "call":
             return False
         return tree.data not in ("true", "false") and all(
-            self._of_signals(one) for one in tree.children if isinstance(one, Tree)
+            self._of_signals(one) for one in tree.children if isinstance(one, SyntaxTree)
         )
 
-    def _check_effect(self, name: str, value: Value, where: Place) -> None:
+    def _check_effect(self, name: str, value: Value, where: SourcePlace) -> None:
         """Note what isn't modelled of a system variable, stop at an analog output. Raises
         KrlRunError for an interpolation that no controller has.
         """
@@ -164,7 +164,7 @@ class Assigning(Control):
         self,
         number: float,
         level: bool,
-        place: Place,
+        place: SourcePlace,
         pulse: float = 0.0,
         *,
         in_time: bool = False,
@@ -238,7 +238,7 @@ class Motions:
         self._noted = noted
         self._external: dict[str, float] = {}  # where the external axes stand, as the program says
 
-    def motion(self, tree: Tree) -> Motion:
+    def motion(self, tree: SyntaxTree) -> Motion:
         """One of PTP, LIN, CIRC and their relatives, SPL. Raises KrlRunError."""
         kind: Kind = _KINDS[tree.data]
         word = str(tree.children[0]) if kind != "spl" else "SPL"
@@ -247,7 +247,7 @@ class Motions:
         frames = [
             child
             for child in tree.children
-            if isinstance(child, Tree) and child.data not in _OTHERS
+            if isinstance(child, SyntaxTree) and child.data not in _OTHERS
         ]
         in_tool = relative and str(tree.children[-1]) == "#TOOL"
         if kind == "circ":
@@ -289,7 +289,7 @@ class Motions:
             spline,
         )
 
-    def target(self, tree: Tree, relative: bool, in_tool: bool) -> Target:
+    def target(self, tree: SyntaxTree, relative: bool, in_tool: bool) -> Target:
         """Where an expression leads to."""
         place = place_of(tree, self._expressions.file)
         if tree.data == "access" and str(tree.children[0]) in STANDING:
@@ -327,7 +327,7 @@ class Motions:
             None, frame, status, turn, relative, in_tool, base, tool, name, self._external_tool
         )
 
-    def _check_components(self, value: Structure, relative: bool, place: Place) -> None:
+    def _check_components(self, value: Structure, relative: bool, place: SourcePlace) -> None:
         """Raise KrlRunError for a component that no position has; note external axes."""
         unknown = next((name for name in value.fields if name not in _COMPONENTS), None)
         if unknown is not None:
@@ -351,7 +351,7 @@ class Motions:
                 text = f"{name} stays at {now:g}: external axes are taken as part of the cell"
                 self._noted(place, text, Effect.PLACES)
 
-    def here(self, name: str, place: Place) -> Target:
+    def here(self, name: str, place: SourcePlace) -> Target:
         """Where the robot stands: PTP $AXIS_ACT, as programs begin; what stands for another place
         of the path is taken as that, which is said.
         """
@@ -371,13 +371,13 @@ class Motions:
     def _external_tool(self) -> bool:
         return self._memory.peek("$IPO_MODE") == Symbol("TCP")
 
-    def frames(self, place: Place) -> tuple[FloatArray, FloatArray]:
+    def frames(self, place: SourcePlace) -> tuple[FloatArray, FloatArray]:
         """$BASE and $TOOL as poses (4, 4) [m]."""
         found = ((name, self._memory.peek(name)) for name in ("$BASE", "$TOOL"))
         base, tool = (pose(Structure({}) if one is None else one, n, place) for n, one in found)
         return base, tool
 
-    def speeds(self, place: Place, *, spline: bool, axis: bool, path: bool) -> Speeds:
+    def speeds(self, place: SourcePlace, *, spline: bool, axis: bool, path: bool) -> Speeds:
         """How fast the system variables say, of a motion of the `spline` kind or of the other;
         each bounded by what a controller takes. axis: $VEL_AXIS and $ACC_AXIS count, as they don't
         for LIN and CIRC; path: $VEL and $ACC count, as they don't for PTP.
@@ -406,7 +406,7 @@ class Motions:
             *(self._jerks(place) if spline else ()),
         )
 
-    def _jerks(self, place: Place) -> tuple[float, float, tuple[float, ...]]:
+    def _jerks(self, place: SourcePlace) -> tuple[float, float, tuple[float, ...]]:
         """$JERK.CP [m/s^3], $JERK.ORI [rad/s^3], inf where none is set, and what $GEAR_JERK leaves
         of the axes' jerk: all of it from the percentage that controllers are delivered with.
         """
@@ -425,14 +425,14 @@ class Motions:
         axis = tuple(self._gear_jerk(j, full, place) for j in range(1, AXES + 1))
         return path, math.radians(turning), axis
 
-    def _gear_jerk(self, axis: int, full: float, place: Place) -> float:
+    def _gear_jerk(self, axis: int, full: float, place: SourcePlace) -> float:
         """Of an axis' jerk, the share that $GEAR_JERK leaves; all where nobody says it."""
         value = self._memory.peek("$GEAR_JERK", axis)
         if value is None or isinstance(value, Unknown):
             return 1.0
         return min(self._share("$GEAR_JERK", (axis,), place) / full, 1.0)
 
-    def blend(self, tree: Tree, *, axis: bool) -> Blend | None:
+    def blend(self, tree: SyntaxTree, *, axis: bool) -> Blend | None:
         """Approximate positioning as the words of `tree` ask for it, of an axis motion or of one of
         the tool; None without a word.
         """
@@ -446,7 +446,7 @@ class Motions:
         onto = words[1] if len(words) > 1 else "C_DIS"
         return replace(found, onto=self._blend(onto, axis=False, place=place))
 
-    def _blend(self, how: str, *, axis: bool, place: Place) -> Blend:
+    def _blend(self, how: str, *, axis: bool, place: SourcePlace) -> Blend:
         """What one word asks for."""
         amount = max(self._number("$APO", _BLEND_WORDS[how], place), 0.0)
         if how in ("C_ORI", "C_VEL"):
@@ -459,7 +459,7 @@ class Motions:
             share = min(max(self._number("$APO", "CPTP", place), 0.0), FULL) / FULL
         return Blend(how, amount * _MM, share)
 
-    def _note_orientation(self, kind: Kind, place: Place) -> None:
+    def _note_orientation(self, kind: Kind, place: SourcePlace) -> None:
         """Note where the tool turns otherwise than evenly in the base."""
         orientation = self._memory.peek("$ORI_TYPE")
         if orientation not in (None, Symbol("VAR"), Symbol("CONSTANT")):
@@ -473,11 +473,11 @@ class Motions:
     def _keeps_orientation(self) -> bool:
         return self._memory.shared.get("$ORI_TYPE") == Symbol("CONSTANT")
 
-    def _number(self, variable: str, component: str, place: Place) -> float:
+    def _number(self, variable: str, component: str, place: SourcePlace) -> float:
         value = self._memory.get(((variable, None), (component, None)), place)
         return number(value, f"{variable}.{component}", place)
 
-    def _positive(self, variable: str, component: str, place: Place) -> float:
+    def _positive(self, variable: str, component: str, place: SourcePlace) -> float:
         held = self._memory.peek(variable)
         fields = held.fields if isinstance(held, Structure) else {}
         written = f"{variable}.{component}"
@@ -496,14 +496,14 @@ class Motions:
             return float(bound)
         return value
 
-    def _share(self, name: str, index: tuple[int, ...] | None, place: Place) -> float:
+    def _share(self, name: str, index: tuple[int, ...] | None, place: SourcePlace) -> float:
         value = number(self._memory.get(((name, index),), place), name, place)
         if not 0.0 < value <= FULL:
             raise KrlRunError(f"{name} is {value:g} %; it must be above 0 and at most 100 %", place)
         return value / FULL
 
 
-def payload_of(value: Value | None, place: Place) -> Payload | None:
+def payload_of(value: Value | None, place: SourcePlace) -> Payload | None:
     """What a LOAD says; None where it has no mass. Raises KrlRunError."""
     if not isinstance(value, Structure) or "M" not in value.fields:
         return None
@@ -520,7 +520,7 @@ def _part_of(value: Structure, name: str) -> Structure:
     return found if isinstance(found, Structure) else Structure({})
 
 
-def _given(value: Structure, name: str, place: Place) -> float:
+def _given(value: Structure, name: str, place: SourcePlace) -> float:
     return number(value.fields.get(name, 0.0), name, place)
 
 
@@ -528,7 +528,7 @@ _OTHERS = ("settings", "approximation")
 
 
 def _is(child: object, data: str) -> bool:
-    return isinstance(child, Tree) and child.data == data
+    return isinstance(child, SyntaxTree) and child.data == data
 
 
 # Motions and spline blocks as statements, with what triggers do meanwhile and what stands after
@@ -543,7 +543,7 @@ class _Trigger:
     """A TRIGGER that waits for its motion; its action is a statement of `file`."""
 
     switch: Switch
-    action: Tree
+    action: SyntaxTree
     file: str
 
     def of_part(self, part: int) -> _Trigger:
@@ -568,7 +568,7 @@ class Moving(Assigning):
     _triggers: list[_Trigger]
     _part: int = 0  # of the spline that is built: a TRIGGER is of the part that follows
 
-    def _trigger(self, tree: Tree) -> None:
+    def _trigger(self, tree: SyntaxTree) -> None:
         when, where, from_start, delay, action, priority = tree.children
         at = self.expressions.number(where, str(when))
         if str(when) not in ("PATH", "DISTANCE"):
@@ -597,7 +597,7 @@ class Moving(Assigning):
             place = place_of(one.action, one.file)
             self.note_at(place, "a TRIGGER with no motion behind it: it never acts")
 
-    def _ptp(self, tree: Tree) -> None:
+    def _ptp(self, tree: SyntaxTree) -> None:
         if self._not_beside(tree):
             return
         due = self._triggers
@@ -610,14 +610,14 @@ class Moving(Assigning):
         self._signals.moved()
         self._act(one for one in due if not one.switch.ahead)
 
-    def _begins(self, tree: Tree, target: Target) -> None:
+    def _begins(self, tree: SyntaxTree, target: Target) -> None:
         """Note a motion that goes from where the robot stands before anything says where."""
         if target.relative and not self.standing.moved:
             name = target.name or "a relative motion"
             text = f"{name} is the first motion: the robot stands in the cell's home"
             self.note(tree, text, Effect.PLACES)
 
-    def _not_beside(self, tree: Tree) -> bool:
+    def _not_beside(self, tree: SyntaxTree) -> bool:
         """Whether a motion stands in what a TRIGGER calls: a controller doesn't take it there."""
         if self._beside:
             text = "a motion in what a TRIGGER calls: a controller refuses it, it isn't driven"
@@ -648,7 +648,7 @@ class Moving(Assigning):
 
     _lin = _circ = _ptp
 
-    def _spline_block(self, tree: Tree) -> None:
+    def _spline_block(self, tree: SyntaxTree) -> None:
         """A block with its triggers: what they switch on first counts from its start, the rest from
         its end, so that no part of a process is taken for positioning.
         """
@@ -676,10 +676,12 @@ class Moving(Assigning):
         self._signals.moved()
         self._act(one for one in due if not one.switch.ahead)
 
-    def _with_settings(self, tree: Tree, build: Callable[[], _Built]) -> _Built:
+    def _with_settings(self, tree: SyntaxTree, build: Callable[[], _Built]) -> _Built:
         """Build with what stands after WITH; it holds for this motion only."""
         settings = next(
-            child for child in tree.children if isinstance(child, Tree) and child.data == "settings"
+            child
+            for child in tree.children
+            if isinstance(child, SyntaxTree) and child.data == "settings"
         )
         assignments = [one for one in settings.children if one is not None]
         if not assignments:
@@ -697,7 +699,7 @@ class Moving(Assigning):
         self.memory.assumed = assumed
         return built
 
-    def _block(self, tree: Tree) -> SplineBlock:
+    def _block(self, tree: SyntaxTree) -> SplineBlock:
         word, _, *parts, approximation = tree.children
         motions: list[Motion] = []
         times: list[TimeBlock] = []

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
 
-from ir_krl.errors import Place
+from ir_krl.errors import SourcePlace
 
 
 class Effect(IntEnum):
@@ -34,7 +34,7 @@ class Note:
     places: in how many of the program, of which `place` is the first.
     """
 
-    place: Place
+    place: SourcePlace
     text: str
     effect: Effect = Effect.NONE
     places: int = 1

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ir_krl.errors import KrlMotionError, KrlRunError, Place
-from ir_krl.language import Parameter, Routine, Source, Tree, place_of
+from ir_krl.errors import KrlMotionError, KrlRunError, SourcePlace
+from ir_krl.language import Parameter, Routine, SourceFile, SyntaxTree, place_of
 from ir_krl.run.commands import Command
 from ir_krl.run.control import Endless, Jump, LoopExit, Returned
 from ir_krl.run.expressions import Expressions
@@ -27,7 +27,7 @@ from ir_values.arrays import FloatArray
 class Routines:
     """All routines of the sources. Raises KrlRunError where a file has two of one name."""
 
-    def __init__(self, sources: Sequence[Source]) -> None:
+    def __init__(self, sources: Sequence[SourceFile]) -> None:
         self._found: dict[str, list[Routine]] = {}
         self._leading = {source.routines[0] for source in sources if source.routines}
         for source in sources:
@@ -103,14 +103,14 @@ class Followed:
 
 
 def follow(
-    sources: Sequence[Source],
+    sources: Sequence[SourceFile],
     home: FloatArray,
     tool: FloatArray,
     *,
     routine: str = "",
     inputs: Mapping[int, bool] | None = None,
     loop_passes: int = 1,
-    settings: Sequence[Source] = (),
+    settings: Sequence[SourceFile] = (),
     kinematics: Kinematics | None = None,
 ) -> Followed:
     """Run `routine` (the first of the sources where "") without moving anything.
@@ -143,18 +143,18 @@ def follow(
         for source in settings:
             for body in source.data:
                 run.settings(body, source.file)
-        run.routine(first, [], Place(first.file))
+        run.routine(first, [], SourcePlace(first.file))
         run.without_motion()
     except Endless:
         pass  # a note says so
     except RecursionError:
-        raise KrlRunError(NESTED, Place(run.expressions.file)) from None
+        raise KrlRunError(NESTED, SourcePlace(run.expressions.file)) from None
     run.name_delivered()
     notes = worst_first(run.notes)
     return Followed(name, tuple(run.commands), notes, run.signals, tuple(run.unknown.values()))
 
 
-def data_of(source: Source) -> dict[str, Value]:
+def data_of(source: SourceFile) -> dict[str, Value]:
     """What the data lists of a file give values to, as those of $config.dat; what can't be read of
     them is left out.
     """
@@ -171,7 +171,7 @@ def data_of(source: Source) -> dict[str, Value]:
     }
 
 
-def _structures(body: Tree) -> dict[str, dict[str, str]]:
+def _structures(body: SyntaxTree) -> dict[str, dict[str, str]]:
     """The types that STRUC declares in a body: what their components are."""
     found: dict[str, dict[str, str]] = {}
     for statement in body.children:
@@ -186,12 +186,12 @@ def _structures(body: Tree) -> dict[str, dict[str, str]]:
     return found
 
 
-def _assigned(tree: Tree) -> set[str]:
+def _assigned(tree: SyntaxTree) -> set[str]:
     """Names of the variables that a body sets, those of the system apart."""
     if tree.data == "assignment":
         name = str(tree.children[0].children[0])
         return set() if name.startswith("$") else {name}
-    return {name for one in tree.children if isinstance(one, Tree) for name in _assigned(one)}
+    return {name for one in tree.children if isinstance(one, SyntaxTree) for name in _assigned(one)}
 
 
 class _Run(Moving):
@@ -217,7 +217,7 @@ class _Run(Moving):
         """What SIGNAL declarations name."""
         return self._signals.named
 
-    def data(self, body: Tree, file: str, *, lenient: bool = False) -> None:
+    def data(self, body: SyntaxTree, file: str, *, lenient: bool = False) -> None:
         """Declarations and values of a data list; lenient: what can't be read of it is noted."""
         self._at(file)
         if not lenient:
@@ -229,7 +229,7 @@ class _Run(Moving):
             except KrlRunError as error:
                 self.note_at(error.place, f"left out: {error.reason}", Effect.PLACES)
 
-    def settings(self, body: Tree, file: str) -> None:
+    def settings(self, body: SyntaxTree, file: str) -> None:
         """Values that count more than those of the data lists."""
         self._at(file)
         for statement in body.children:
@@ -254,7 +254,7 @@ class _Run(Moving):
             text = f"of $config.dat, not in the files, as delivered: {named}; --set 'NAME=…'"
             self.note_at(next(iter(said.values())), text, Effect.SPEEDS)
 
-    def background(self, sources: Sequence[Source]) -> None:
+    def background(self, sources: Sequence[SourceFile]) -> None:
         """What programs beside this one set is known as it stands at the start, and assumed."""
         for source in sources:
             for name in {name for one in source.routines for name in _assigned(one.body)}:
@@ -262,7 +262,7 @@ class _Run(Moving):
                 if self.memory.valued(name):
                     self.memory.assumed.setdefault(name, Assumption(text, Effect.MOTIONS))
 
-    def _stopped(self, place: Place, name: str) -> None:
+    def _stopped(self, place: SourcePlace, name: str) -> None:
         """What stops the advance run is read: where the robot stands is known then."""
         self.stop(place, name)
         memory = self.memory
@@ -275,7 +275,7 @@ class _Run(Moving):
         elif name in PLACE_NOW:
             memory.hold(name, self.standing.place(self._motions.here(name, place)))
 
-    def routine(self, routine: Routine, arguments: list[Value | None], place: Place) -> Value:
+    def routine(self, routine: Routine, arguments: list[Value | None], place: SourcePlace) -> Value:
         """Run a routine; the value of its RETURN, 0 without one. OUT parameters are read by the
         caller.
         """
@@ -323,7 +323,7 @@ class _Run(Moving):
 
     # names and values
 
-    def _declare(self, tree: Tree) -> None:
+    def _declare(self, tree: SyntaxTree) -> None:
         everywhere = GLOBAL in tree.children or self.memory.module == CONFIGURATION
         kind, *declarators = (one for one in tree.children if one != GLOBAL)
         for declarator in declarators:
@@ -335,45 +335,45 @@ class _Run(Moving):
                 value = copied(self.expressions.value(expression))
             self.memory.declare(str(name), value, str(kind), everywhere)
 
-    def _sizes(self, index: Tree) -> tuple[int, ...]:
+    def _sizes(self, index: SyntaxTree) -> tuple[int, ...]:
         """How many elements an array has in each direction; () where that isn't known."""
         values = [self.expressions.value(one) for one in index.children if one is not None]
         known = tuple(one for one in values if isinstance(one, int))
         return known if len(known) == len(values) else ()
 
-    def _structure(self, tree: Tree) -> None:
+    def _structure(self, tree: SyntaxTree) -> None:
         """Types are known before the program runs."""
 
     _enumeration = _external = _structure
 
-    def _unmodelled(self, tree: Tree) -> None:
+    def _unmodelled(self, tree: SyntaxTree) -> None:
         """A statement that moves nothing and isn't modelled."""
         what = _UNMODELLED[tree.data]
         self.note(tree, f"{what} isn't modelled: no motion assumed", Effect.NONE)
 
-    def _analog(self, tree: Tree) -> None:
+    def _analog(self, tree: SyntaxTree) -> None:
         """ANIN and ANOUT stop the advance run."""
         self._unmodelled(tree)
         self.stop(self.place(tree), "ANIN or ANOUT")
 
     _confirm = _error_proceed = _channel = _import = _unmodelled
 
-    def _asynchronous(self, tree: Tree) -> None:
+    def _asynchronous(self, tree: SyntaxTree) -> None:
         self.note(tree, "ASYPTP moves external axes alone: not driven", Effect.PLACES)
 
-    def _signal(self, tree: Tree) -> None:
+    def _signal(self, tree: SyntaxTree) -> None:
         name, first, last = (one for one in tree.children if one != GLOBAL)
         end = None if last is None else self.expressions.path(last)
         self._signals.declare(str(name), self.expressions.path(first), end, self.place(tree))
 
     # calls
 
-    def _call(self, tree: Tree) -> None:
+    def _call(self, tree: SyntaxTree) -> None:
         name, *arguments = tree.children
         self._calling = True  # as a statement: no value is used
         self._called(str(name), arguments, self.place(tree))
 
-    def _called(self, name: str, arguments: list[Any], place: Place) -> Value:
+    def _called(self, name: str, arguments: list[Any], place: SourcePlace) -> Value:
         statement = self._calling
         self._calling = False
         trees = [one.children[0] for one in arguments if one is not None]
@@ -398,7 +398,7 @@ class _Run(Moving):
         own = TEXT_FUNCTIONS | COMPUTED.keys() | {"PULSE"}
         return name in own or self._library.has(name)
 
-    def _built_in(self, name: str, trees: list[Any], place: Place) -> Value:
+    def _built_in(self, name: str, trees: list[Any], place: SourcePlace) -> Value:
         """What a routine of every controller does."""
         if name == "PULSE":
             return self._pulse(trees, place)
@@ -413,7 +413,7 @@ class _Run(Moving):
         values = [None if one is None else self.expressions.value(one) for one in trees]
         return self._library.call(name, values, place)
 
-    def _run_routine(self, routine: Routine, trees: list[Any], place: Place) -> Value:
+    def _run_routine(self, routine: Routine, trees: list[Any], place: SourcePlace) -> Value:
         """A routine of the files with its arguments; those that come back are set."""
         values = [
             None if one is None else self._argument(one, k, routine) for k, one in enumerate(trees)
@@ -428,7 +428,12 @@ class _Run(Moving):
         return result
 
     def _given_back(
-        self, routine: Routine, parameter: Parameter, tree: Tree, value: Value, place: Place
+        self,
+        routine: Routine,
+        parameter: Parameter,
+        tree: SyntaxTree,
+        value: Value,
+        place: SourcePlace,
     ) -> None:
         """The value of a parameter that is one of the caller's variables."""
         path = self.expressions.path(tree)
@@ -437,7 +442,7 @@ class _Run(Moving):
             self.note_at(place, text, Effect.MOTIONS)
         self.memory.set(path, value, place)
 
-    def _unknown(self, name: str, arguments: int, place: Place, *, function: bool) -> Value:
+    def _unknown(self, name: str, arguments: int, place: SourcePlace, *, function: bool) -> Value:
         """A routine that nobody gave: it moves nothing, and the advance run stops at it. Its value
         must be set where one is used.
         """
@@ -459,7 +464,7 @@ class _Run(Moving):
             if not variable.startswith("$") and self.memory.has(variable):
                 self.memory.may_change(variable, name)
 
-    def _computed(self, name: str, trees: list[Any], place: Place) -> Value:
+    def _computed(self, name: str, trees: list[Any], place: SourcePlace) -> Value:
         """FORWARD and INVERSE, of the kinematics of the robot: 0 in their last argument, or 1 and
         no value.
         """
@@ -486,14 +491,14 @@ class _Run(Moving):
             self.memory.set(self.expressions.path(trees[-1]), failed, place)
         return Unknown(name) if value is None else value
 
-    def _argument(self, tree: Tree, k: int, routine: Routine) -> Value | None:
+    def _argument(self, tree: SyntaxTree, k: int, routine: Routine) -> Value | None:
         """The value of an argument; one that only comes back needs none."""
         out = k < len(routine.parameters) and routine.parameters[k].out
         if out and tree.data == "access" and not self.memory.has(self.expressions.path(tree)[0][0]):
             return None
         return self.expressions.value(tree)
 
-    def _pulse(self, trees: list[Any], place: Place) -> Value:
+    def _pulse(self, trees: list[Any], place: SourcePlace) -> Value:
         if len(trees) != 3 or trees[0] is None or trees[0].data != "access":
             raise KrlRunError("PULSE takes an output, its value and a time", place)
         (name, index), *_ = self.expressions.path(trees[0])
@@ -506,18 +511,18 @@ class _Run(Moving):
 
     # interrupts
 
-    def _interrupt_declared(self, tree: Tree) -> None:
+    def _interrupt_declared(self, tree: SyntaxTree) -> None:
         call = tree.children[-1]
         if str(call.children[0]) != "IR_STOPM":
             text = f"the interrupt that calls {call.children[0]} isn't followed"
             self.note(tree, text, Effect.MOTIONS)
 
-    def _interrupt_switched(self, tree: Tree) -> None:
+    def _interrupt_switched(self, tree: SyntaxTree) -> None:
         """Interrupts aren't followed: their declaration says so."""
 
     _resume = _interrupt_switched
 
-    def _brake(self, tree: Tree) -> None:
+    def _brake(self, tree: SyntaxTree) -> None:
         if self._beside:
             text = "BRAKE in what a TRIGGER calls stops the robot: not followed"
             self.note(tree, text, Effect.MOTIONS)

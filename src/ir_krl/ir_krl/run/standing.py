@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from ir_description.poses import pose_of, rotation_from_abc
-from ir_krl.errors import KrlRunError, Place
+from ir_krl.errors import KrlRunError, SourcePlace
 from ir_krl.run.commands import Command, Motion, SplineBlock, Target
 from ir_krl.run.values import (
     AXIS_NAMES,
@@ -35,7 +35,7 @@ class Kinematics(Protocol):
     def flange(self, q: FloatArray) -> FloatArray:
         """KUKA's flange (N, 4, 4) [m] in the robot's foot, of q (N, n) [rad]."""
 
-    def reached(self, target: Target, q: FloatArray, place: Place) -> FloatArray:
+    def reached(self, target: Target, q: FloatArray, place: SourcePlace) -> FloatArray:
         """The configuration (n,) that a motion from q (n,) to the target ends in."""
 
     def status_turn(self, q: FloatArray) -> tuple[int, int]:
@@ -82,7 +82,7 @@ class Standing:
         found = frame(frames.pose(flange))
         return Structure({**found.fields, **state}, "E6POS")
 
-    def forward(self, value: Value, frames: Target, place: Place) -> Value | None:
+    def forward(self, value: Value, frames: Target, place: SourcePlace) -> Value | None:
         """FORWARD: the E6POS of axis angles with the base and the tool of `frames`; None without a
         robot. Raises KrlRunError.
         """
@@ -91,7 +91,7 @@ class Standing:
             return None
         return self._position(frames, self.kinematics.flange(q[None])[0], q)
 
-    def inverse(self, target: Target, start: Value, place: Place) -> Value | None:
+    def inverse(self, target: Target, start: Value, place: SourcePlace) -> Value | None:
         """INVERSE: the axis angles at a target, from where they start; None without a robot. Raises
         KrlRunError, and KrlMotionError where no angles lead there.
         """
@@ -142,7 +142,7 @@ def _angles(q: FloatArray) -> Structure:
     return Structure(dict(zip(AXIS_NAMES, angles, strict=True)), "E6AXIS")
 
 
-def _whole_axes(value: Value, place: Place) -> FloatArray:
+def _whole_axes(value: Value, place: SourcePlace) -> FloatArray:
     """The configuration (n,) [rad] of axis angles. Raises KrlRunError where one lacks."""
     if isinstance(value, Unknown):
         raise KrlRunError(value.refusal("a computed position"), place)

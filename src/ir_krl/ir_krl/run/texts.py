@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ir_krl.errors import KrlRunError, Place
-from ir_krl.language import Tree
+from ir_krl.errors import KrlRunError, SourcePlace
+from ir_krl.language import SyntaxTree
 from ir_krl.run.expressions import Expressions
 from ir_krl.run.values import Symbol, Unknown, Value, integer, kind_of, text_of
 
@@ -23,7 +23,9 @@ _ARGUMENTS = {
 TEXT_FUNCTIONS = frozenset(_ARGUMENTS)
 
 
-def text_value(name: str, trees: Sequence[Any], expressions: Expressions, place: Place) -> Value:
+def text_value(
+    name: str, trees: Sequence[Any], expressions: Expressions, place: SourcePlace
+) -> Value:
     """What a function of texts returns; StrCopy, StrAdd and StrClear also set their first argument.
 
     Raises KrlRunError for arguments that it doesn't take.
@@ -51,7 +53,9 @@ def text_value(name: str, trees: Sequence[Any], expressions: Expressions, place:
     return len(before + added) if name == "STRADD" else True
 
 
-def _alike(trees: Sequence[Tree], expressions: Expressions, place: Place) -> tuple[str, str]:
+def _alike(
+    trees: Sequence[SyntaxTree], expressions: Expressions, place: SourcePlace
+) -> tuple[str, str]:
     """Two texts as the third argument (#CASE_SENS, #NOT_CASE_SENS) compares them."""
     one, other = (_text(tree, expressions, place) for tree in trees[:2])
     how = expressions.value(trees[2])
@@ -62,14 +66,14 @@ def _alike(trees: Sequence[Tree], expressions: Expressions, place: Place) -> tup
     return one, other
 
 
-def _text(tree: Tree, expressions: Expressions, place: Place) -> str:
+def _text(tree: SyntaxTree, expressions: Expressions, place: SourcePlace) -> str:
     value = expressions.value(tree)
     if isinstance(value, Unknown):
         value = expressions.memory.guess(value, "", place)
     return text_of(value)
 
 
-def _put(tree: Tree, text: str, expressions: Expressions, place: Place) -> None:
+def _put(tree: SyntaxTree, text: str, expressions: Expressions, place: SourcePlace) -> None:
     if tree.data != "access":
         raise KrlRunError("the first argument is a variable: that gets the text", place)
     expressions.memory.set(expressions.path(tree), text, place)

@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from ir_description.poses import abc_from_rotation, pose_of, rotation_from_abc
-from ir_krl.errors import KrlRunError, Place
+from ir_krl.errors import KrlRunError, SourcePlace
 from ir_values.arrays import FloatArray
 
 # Values of KRL: numbers, truth values, texts, enumeration values, structures and arrays.
@@ -58,7 +58,7 @@ class Array:
         elements = {index: copied(value) for index, value in self.elements.items()}
         return Array(elements, self.kind, self.sizes)
 
-    def check(self, index: tuple[int, ...], name: str, place: Place) -> None:
+    def check(self, index: tuple[int, ...], name: str, place: SourcePlace) -> None:
         """Raise KrlRunError for an index that isn't within the declared sizes."""
         written = ", ".join(map(str, index))
         if any(one < 1 for one in index):
@@ -126,7 +126,7 @@ def real(value: float) -> float:
         return float(np.float32(value))
 
 
-def in_range(value: int | float, place: Place) -> int | float:
+def in_range(value: int | float, place: SourcePlace) -> int | float:
     """An INT of 32 bits or a REAL of single precision, as the controller has them. Raises
     KrlRunError beyond their range, where a controller stops.
     """
@@ -146,7 +146,7 @@ def in_range(value: int | float, place: Place) -> int | float:
     return real(value)
 
 
-def number(value: Value, what: str, place: Place) -> float:
+def number(value: Value, what: str, place: SourcePlace) -> float:
     """An INT or a REAL as a float. Raises KrlRunError."""
     if isinstance(value, Unknown):
         raise KrlRunError(value.refusal(what), place)
@@ -155,7 +155,7 @@ def number(value: Value, what: str, place: Place) -> float:
     return float(value)
 
 
-def integer(value: Value, what: str, place: Place) -> int:
+def integer(value: Value, what: str, place: SourcePlace) -> int:
     """An INT, or a REAL rounded as KRL does. Raises KrlRunError."""
     if isinstance(value, int) and not isinstance(value, bool):
         return value
@@ -182,7 +182,7 @@ def text_of(value: Value) -> str:
     return "".join(letters)
 
 
-def truth(value: Value, what: str, place: Place) -> bool:
+def truth(value: Value, what: str, place: SourcePlace) -> bool:
     """A BOOL. Raises KrlRunError."""
     if isinstance(value, Unknown):
         raise KrlRunError(value.refusal(what), place)
@@ -242,10 +242,12 @@ def _number_as(kind: str, value: int | float) -> Value:
     if kind == "REAL":
         return real(value)
     if kind == "INT":
-        return in_range(rounded(value), Place()) if isinstance(value, float) else value
+        return in_range(rounded(value), SourcePlace()) if isinstance(value, float) else value
     if kind == "CHAR" and isinstance(value, int):
         if not 0 <= value < _LETTERS:
-            raise KrlRunError(f"a CHAR is from 0 to {_LETTERS - 1}; this one is {value}", Place())
+            raise KrlRunError(
+                f"a CHAR is from 0 to {_LETTERS - 1}; this one is {value}", SourcePlace()
+            )
         return chr(value)
     return value
 
@@ -286,12 +288,12 @@ def is_axis_value(value: Structure) -> bool:
     return any(name in value.fields for name in AXIS_NAMES)
 
 
-def components(value: Structure, names: tuple[str, ...], place: Place) -> dict[str, float]:
+def components(value: Structure, names: tuple[str, ...], place: SourcePlace) -> dict[str, float]:
     """Those of `names` that are there, as numbers. Raises KrlRunError."""
     return {name: number(value.fields[name], name, place) for name in names if name in value.fields}
 
 
-def pose(value: Value, what: str, place: Place) -> FloatArray:
+def pose(value: Value, what: str, place: SourcePlace) -> FloatArray:
     """The pose (4, 4) [m] of a FRAME, POS or E6POS; components that are missing are 0. Raises
     KrlRunError.
     """
@@ -312,7 +314,7 @@ def frame(transform: FloatArray, kind: str = "FRAME") -> Structure:
     )
 
 
-def axes(value: Structure, place: Place) -> dict[str, float]:
+def axes(value: Structure, place: SourcePlace) -> dict[str, float]:
     """Axis angles [rad] by name."""
     return {
         name: float(np.radians(angle))

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ir_krl.errors import Place
+from ir_krl.errors import SourcePlace
 from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES, components, frame
 from ir_krl.write.statements import Style, WrittenMove
 from ir_values.arrays import FloatArray
@@ -176,5 +176,5 @@ def decimal(value: float, digits: int) -> str:
 
 def frame_text(transform: FloatArray, digits: int) -> str:
     """X to C [mm, deg] of a pose (4, 4) [m], without brackets."""
-    fields = components(frame(transform), FRAME_NAMES, Place())
+    fields = components(frame(transform), FRAME_NAMES, SourcePlace())
     return ",".join(f"{name} {decimal(value, digits)}" for name, value in fields.items())

@@ -11,8 +11,8 @@ from typing import Literal
 
 import numpy as np
 
-from ir_krl.errors import KrlError, Place
-from ir_krl.language import Source
+from ir_krl.errors import KrlError, SourcePlace
+from ir_krl.language import SourceFile
 from ir_krl.run.commands import Payload
 from ir_krl.run.motions import payload_of
 from ir_krl.run.program import data_of
@@ -42,11 +42,11 @@ class FrameNumbers:
 
     tools: Mapping[str, int] = field(default_factory=dict)
     bases: Mapping[str, int] = field(default_factory=dict)
-    plant: Source | None = None
+    plant: SourceFile | None = None
 
 
 def frame_numbers(
-    tools: Sequence[str], bases: Sequence[str], plant: Source | None = None
+    tools: Sequence[str], bases: Sequence[str], plant: SourceFile | None = None
 ) -> FrameNumbers:
     """What texts say: tools "N" or "N=PART", bases "N=MACHINE", the plant's $config.dat. Raises
     KrlError.
@@ -82,7 +82,7 @@ def tool_numbers(
     tools, carried = (_plant(asked, name) for name in ("TOOL_DATA", "LOAD_DATA"))
 
     def origin(name: str, number: int) -> Origin | None:
-        load = payload_of(carried.get(number), Place())
+        load = payload_of(carried.get(number), SourcePlace())
         if _is_null(tools.get(number)) and (load is None or load.mass <= 0.0):
             return "free"
         same = load is not None and _same_load(load, loads[name])
@@ -162,7 +162,7 @@ def _is_null(value: Value | None) -> bool:
 def _same_frame(value: Value | None, frame: FloatArray) -> bool:
     if not isinstance(value, Structure):
         return False
-    apart = np.abs(pose(value, "the plant's frame", Place()) - frame)
+    apart = np.abs(pose(value, "the plant's frame", SourcePlace()) - frame)
     return bool(apart[:3, 3].max() <= _SAME_PLACE and apart[:3, :3].max() <= _SAME_TURN)
 
 

@@ -14,8 +14,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from ir_krl.errors import KrlError, Place
-from ir_krl.language import Source, Tree
+from ir_krl.errors import KrlError, SourcePlace
+from ir_krl.language import SourceFile, SyntaxTree
 from ir_msgs_py.modes import DEEPER, modes_of
 from ir_values.errors import InvalidValueError
 
@@ -71,11 +71,11 @@ def read_plc_table(text: str, file: str) -> dict[int, PlcPause]:
     if missing:
         raise KrlError(
             f"column {missing[0]} is missing: a PLC table has {', '.join(COLUMNS)}",
-            Place(file, 1, 1),
+            SourcePlace(file, 1, 1),
         )
     found: dict[int, PlcPause] = {}
     for line, row in enumerate(rows, start=2):
-        place = Place(file, line, 1)
+        place = SourcePlace(file, line, 1)
         pause = _pause({name: row.get(name) or "" for name in COLUMNS}, place)
         if pause.number in found:
             raise KrlError(f"pause {pause.number} stands twice in the table", place)
@@ -83,7 +83,7 @@ def read_plc_table(text: str, file: str) -> dict[int, PlcPause]:
     return found
 
 
-def _pause(row: Mapping[str, str], place: Place) -> PlcPause:
+def _pause(row: Mapping[str, str], place: SourcePlace) -> PlcPause:
     number = _number(row, "pause", 1.0, PAUSES_MAX, place)
     seconds = _number(row, "seconds", 0.0, _WEEK, place)
     wake_at = _number(row, "wake_at", 0.0, seconds, place)
@@ -104,7 +104,9 @@ def _pause(row: Mapping[str, str], place: Place) -> PlcPause:
     return PlcPause(round(number), row["place"], seconds, modes, times, wake_at)
 
 
-def _number(row: Mapping[str, str], name: str, low: float, high: float, place: Place) -> float:
+def _number(
+    row: Mapping[str, str], name: str, low: float, high: float, place: SourcePlace
+) -> float:
     try:
         value = float(row[name])
     except ValueError:
@@ -114,7 +116,7 @@ def _number(row: Mapping[str, str], name: str, low: float, high: float, place: P
     return value
 
 
-def plc_input(sources: Sequence[Source], *, there: bool) -> dict[int, bool]:
+def plc_input(sources: Sequence[SourceFile], *, there: bool) -> dict[int, bool]:
     """The input by which an exported program hears whether the PLC spends its pauses, and what it
     reads; empty for a program that asks for none.
     """
@@ -131,7 +133,7 @@ def plc_input(sources: Sequence[Source], *, there: bool) -> dict[int, bool]:
 
 def _spelled(tree: object) -> str:
     """The words of a tree, one after the other."""
-    if isinstance(tree, Tree):
+    if isinstance(tree, SyntaxTree):
         inner = "".join(_spelled(child) for child in tree.children)
         return f"[{inner}]" if tree.data == "index" else inner
     return "" if tree is None else str(tree)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ir_description import drawn_robots
 from ir_msgs_py.report import MovementKind, PlannedMovement
-from ir_msgs_py.savings import Change, Hop, Saving, Side
+from ir_msgs_py.savings import HopSaving, Saving, Side, StepChange
 from ir_planner.checks import JouleInterval, interval, movement_energy, total_report
 from ir_planner.program import ProgramRequest, Spreads
 from ir_planner.scene import PlanningScene, scene_with
@@ -171,10 +171,12 @@ def _begins(step: PlannedMovement, last: CostedHop) -> bool:
     return before.kind == MovementKind.SERVICE_ENTRY
 
 
-def _hop(hop: CostedHop) -> Hop:
+def _hop(hop: CostedHop) -> HopSaving:
     within = interval(hop.joules, hop.robots)
     mode = hop.steps[0].power_mode
-    return Hop(hop.title, hop.is_pause, hop.seconds, hop.joules, within.low, within.high, mode)
+    return HopSaving(
+        hop.title, hop.is_pause, hop.seconds, hop.joules, within.low, within.high, mode
+    )
 
 
 def _power(
@@ -228,7 +230,7 @@ _SAME_TIME = 0.005  # s
 _SAMPLES = 200
 
 
-def changes(today: Costed, planned: Costed, most: int = MOST) -> tuple[Change, ...]:
+def changes(today: Costed, planned: Costed, most: int = MOST) -> tuple[StepChange, ...]:
     """The changes that save most from today's program to the planned one, those of least work
     first.
     """
@@ -249,9 +251,11 @@ def _keyed(hops: Sequence[CostedHop]) -> Iterator[tuple[tuple[str, int], CostedH
         yield (hop.title, times[hop.title]), hop
 
 
-def _change(before: CostedHop, after: CostedHop) -> Change:
+def _change(before: CostedHop, after: CostedHop) -> StepChange:
     work, words = _paused(before, after) if before.is_pause else _moved(before, after)
-    return Change(before.title, work, words, (before.seconds, after.seconds), saving(before, after))
+    return StepChange(
+        before.title, work, words, (before.seconds, after.seconds), saving(before, after)
+    )
 
 
 def _paused(before: CostedHop, after: CostedHop) -> tuple[int, str]:

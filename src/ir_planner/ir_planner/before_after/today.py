@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_description import CellPath, Load
-from ir_krl import PLC_DONE, Place
+from ir_krl import PLC_DONE, SourcePlace
 from ir_msgs_py.cartesian import LINE, CartesianPath
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.status import StatusCode
@@ -123,7 +123,7 @@ def driven_as(own: CellPath, driven: CellPath) -> CellPath:
     return replace(own, path=path)
 
 
-def lines_of(places: Sequence[Place]) -> str:
+def lines_of(places: Sequence[SourcePlace]) -> str:
     """Where motions stand in their source."""
     first = places[0]
     last = places[-1]
@@ -141,7 +141,7 @@ def _check_lines(steps: Sequence[DrivenStep], lines: Lines) -> None:
             )
 
 
-def _worked(step: DrivenStep, lines: Lines | None) -> tuple[Place, ...]:
+def _worked(step: DrivenStep, lines: Lines | None) -> tuple[SourcePlace, ...]:
     """Places of its motions that belong to a process."""
     if lines is None or not step.moves:
         return step.process
@@ -156,7 +156,7 @@ def _may_work(step: DrivenStep) -> bool:
     return len(drawn) > 1 or any(segment.kind != LINE for one in drawn for segment in one.segments)
 
 
-def _check_alone(step: DrivenStep, worked: tuple[Place, ...]) -> None:
+def _check_alone(step: DrivenStep, worked: tuple[SourcePlace, ...]) -> None:
     """Raise RequestError where a step has motions that no path of the tool describes."""
     if all(one is not None for one in step.tool) and step.tool and all(step.at_rest):
         return

@@ -14,7 +14,7 @@ from ir_planner.program import (
     MOTORS,
     Charge,
     Doors,
-    Pause,
+    PlannedPause,
     ProgramRequest,
     Scenes,
     placed_steps,
@@ -339,7 +339,7 @@ class _Costing:
 
     def pause(self, stretch: TodayMotion, here: str, scene: PlanningScene) -> None:
         """A standstill."""
-        pause = Pause(here, stretch.seconds, stretch.power_mode, self._q, scene)
+        pause = PlannedPause(here, stretch.seconds, stretch.power_mode, self._q, scene)
         step = spent(pause, self._request.settings.transitions)
         self.steps.append(self._charge.stood(step, pause))
 

@@ -11,7 +11,7 @@ from ir_planner.cartesian.dead_ends import chains_through, closer_at
 from ir_planner.cartesian.joint_curve import Angle, JointCurve, angle_along, curve_of
 from ir_planner.cartesian.path_times import SentPath, sent, timed_stroke
 from ir_planner.cartesian.slowing import slower_between, unhurried
-from ir_planner.cartesian.speed_ramps import Span
+from ir_planner.cartesian.speed_ramps import StrokeSpan
 from ir_planner.cartesian.tool_path import PathRefusedError, StrayedError, ToolPath, ToolPathRequest
 from ir_planner.checks import ToolUse
 from ir_planner.curves import extremes
@@ -319,13 +319,13 @@ def _check_duration(duration: float, asked: ToolPathRequest) -> None:
         )
 
 
-def _spans(whole: ToolPath, first: int, last: int, slower: float) -> tuple[Span, ...]:
+def _spans(whole: ToolPath, first: int, last: int, slower: float) -> tuple[StrokeSpan, ...]:
     """Parts of a stroke; those that follow each other at one speed are one, so that ramps may reach
     over them.
     """
-    spans: list[Span] = []
+    spans: list[StrokeSpan] = []
     for part, length in zip(whole.parts[first:last], np.diff(whole.ends)[first:last], strict=True):
-        span = Span(float(length), part.speed * slower, part.kept)
+        span = StrokeSpan(float(length), part.speed * slower, part.kept)
         if spans and (spans[-1].speed, spans[-1].kept) == (span.speed, span.kept):
             span = replace(span, length=spans.pop().length + span.length)
         spans.append(span)

@@ -17,9 +17,9 @@ from ir_planner.cartesian.speed_ramps import (
     ENOUGH,
     PER_RAMP,
     USED,
-    Driven,
-    Span,
+    DrivenMotion,
     SpeedLaw,
+    StrokeSpan,
     TooShortError,
     driven,
     law_of,
@@ -88,7 +88,7 @@ class TimedStroke:
         spline = self.slowness
         return replace(self, law=slower, slowness=BSpline(spline.t * factor, spline.c, spline.k))
 
-    def at(self, tau: FloatArray) -> Driven:
+    def at(self, tau: FloatArray) -> DrivenMotion:
         """The motion at instants tau (M,) s of the law."""
         s, v, a, j = self.law.at(tau)
         t = tau
@@ -112,7 +112,7 @@ class TimedStroke:
 
 def timed_stroke(
     curve: JointCurve,
-    spans: tuple[Span, ...],
+    spans: tuple[StrokeSpan, ...],
     tolerance: float,
     limits: MotionLimits,
     scene: PlanningScene,
@@ -138,11 +138,11 @@ def timed_stroke(
 
 def fitting(
     curve: JointCurve,
-    spans: tuple[Span, ...],
+    spans: tuple[StrokeSpan, ...],
     tolerance: float,
     limits: MotionLimits,
     scene: PlanningScene,
-) -> tuple[tuple[Span, ...], FloatArray]:
+) -> tuple[tuple[StrokeSpan, ...], FloatArray]:
     """Spans and ramps that fit into them. Raises PathRefusedError."""
     for slow, used in ((True, USED), (True, _USED_AT_MOST)):
         ramps = ramps_of(curve, spans, limits, scene, slow=slow, used=used)
@@ -163,7 +163,7 @@ def fitting(
 
 def _grown(
     made: TimedStroke,
-    spans: tuple[Span, ...],
+    spans: tuple[StrokeSpan, ...],
     ramps: FloatArray,
     limits: MotionLimits,
     scene: PlanningScene,
@@ -190,8 +190,8 @@ def _grown(
 
 
 def _slower(
-    spans: tuple[Span, ...], error: TooShortError, tolerance: float
-) -> tuple[Span, ...] | None:
+    spans: tuple[StrokeSpan, ...], error: TooShortError, tolerance: float
+) -> tuple[StrokeSpan, ...] | None:
     """The spans with a lower speed where one is too short for it; None where it may not be
     lower.
     """
@@ -204,7 +204,7 @@ def _slower(
 
 def _too_short(
     curve: JointCurve,
-    spans: tuple[Span, ...],
+    spans: tuple[StrokeSpan, ...],
     ramps: FloatArray,
     error: TooShortError,
     limits: MotionLimits,
@@ -270,7 +270,7 @@ def _slowed(
 
 
 def refused(
-    motion: Driven, limits: MotionLimits, scene: PlanningScene, tolerance: float
+    motion: DrivenMotion, limits: MotionLimits, scene: PlanningScene, tolerance: float
 ) -> PathRefusedError:
     """Why the speed can't be kept: the worst place, its axis and what it lacks."""
     factor = use_of(motion, limits, scene)
@@ -285,7 +285,7 @@ def refused(
     )
 
 
-def _worst(motion: Driven, k: int, limits: MotionLimits, scene: PlanningScene) -> str:
+def _worst(motion: DrivenMotion, k: int, limits: MotionLimits, scene: PlanningScene) -> str:
     """The axis that lacks most at instant k of a motion, and what it lacks."""
     torque = torque_use(
         scene.dynamics, motion.q[k : k + 1], motion.qd[k : k + 1], motion.qdd[k : k + 1]

@@ -14,7 +14,7 @@ import numpy as np
 from ir_kernels import portable
 from ir_planner.cartesian.joint_curve import JointCurve
 from ir_planner.cartesian.path_times import TimedStroke, fitting, instants, refused
-from ir_planner.cartesian.speed_ramps import ENOUGH, Span, law_of, use_of
+from ir_planner.cartesian.speed_ramps import ENOUGH, StrokeSpan, law_of, use_of
 from ir_planner.scene import MotionLimits, PlanningScene
 from ir_values.arrays import FloatArray
 
@@ -46,7 +46,7 @@ def looked_at(made: TimedStroke) -> FloatArray:
 
 
 def unhurried(
-    curve: JointCurve, spans: tuple[Span, ...], limits: MotionLimits, scene: PlanningScene
+    curve: JointCurve, spans: tuple[StrokeSpan, ...], limits: MotionLimits, scene: PlanningScene
 ) -> TimedStroke:
     """The stroke from rest to rest, slower than asked for wherever the axes need it. Raises
     PathRefusedError.

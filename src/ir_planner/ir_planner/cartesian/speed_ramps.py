@@ -17,7 +17,7 @@ from ir_values.arrays import BoolArray, FloatArray
 
 
 @dataclass(frozen=True)
-class Span:
+class StrokeSpan:
     """A part of a stroke: length [m], the speed asked for [m/s], whether it has to be kept."""
 
     length: float
@@ -76,7 +76,7 @@ class SpeedLaw:
         return s, speed, dv / T * 6.0 * x * (1.0 - x), dv / (T * T) * (6.0 - 12.0 * x)
 
 
-def law_of(spans: tuple[Span, ...], ramps: FloatArray) -> SpeedLaw:
+def law_of(spans: tuple[StrokeSpan, ...], ramps: FloatArray) -> SpeedLaw:
     """From rest to rest; ramps (K + 1,) s: how long the changes of speed take at the ends of the
     spans.
 
@@ -102,7 +102,7 @@ def law_of(spans: tuple[Span, ...], ramps: FloatArray) -> SpeedLaw:
 
 
 def ramp_places(
-    spans: tuple[Span, ...], k: int, duration: FloatArray
+    spans: tuple[StrokeSpan, ...], k: int, duration: FloatArray
 ) -> tuple[FloatArray, float, float]:
     """Where the ramp before span k (or after the last) begins (D,) m for durations (D,) s; both
     speeds.
@@ -120,7 +120,7 @@ def ramp_places(
 
 
 @dataclass(frozen=True, eq=False)
-class Driven:
+class DrivenMotion:
     """Motion at M instants: t (M,) s, s (M,) m along the path, speed (M,) m/s; q, qd, qdd, qddd (M,
     n).
     """
@@ -136,7 +136,7 @@ class Driven:
 
 def driven(
     curve: JointCurve, t: FloatArray, s: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray
-) -> Driven:
+) -> DrivenMotion:
     """The axes at s (M,) with speed, acceleration and jerk (M,) along the path."""
     along = curve.at(np.clip(s, curve.begin, curve.end))
     return with_speed(along, t, s, v, a, j)
@@ -149,7 +149,7 @@ def with_speed(
     v: FloatArray,
     a: FloatArray,
     j: FloatArray,
-) -> Driven:
+) -> DrivenMotion:
     """The same from q and its derivatives by s (M, n)."""
     q, first, second, third = along
     v1 = v[:, None]
@@ -158,10 +158,10 @@ def with_speed(
     qd = first * v1
     qdd = second * (v1 * v1) + first * a1
     qddd = third * portable.power(v1, 3) + 3.0 * second * v1 * a1 + first * j1
-    return Driven(t, s, v, q, qd, qdd, qddd)
+    return DrivenMotion(t, s, v, q, qd, qdd, qddd)
 
 
-def use_of(motion: Driven, limits: MotionLimits, scene: PlanningScene) -> FloatArray:
+def use_of(motion: DrivenMotion, limits: MotionLimits, scene: PlanningScene) -> FloatArray:
     """By what factor (M,) a motion would have to last longer; at most 1: within the limits."""
     torque = torque_use(scene.dynamics, motion.q, motion.qd, motion.qdd)
     return lasting_longer(
@@ -181,7 +181,7 @@ _ZOOMS = 3
 
 def ramps_of(
     curve: JointCurve,
-    spans: tuple[Span, ...],
+    spans: tuple[StrokeSpan, ...],
     limits: MotionLimits,
     scene: PlanningScene,
     *,
@@ -198,7 +198,7 @@ def ramps_of(
 
 def _ramp(
     curve: JointCurve,
-    spans: tuple[Span, ...],
+    spans: tuple[StrokeSpan, ...],
     k: int,
     limits: MotionLimits,
     scene: PlanningScene,
@@ -237,7 +237,7 @@ def _shortest(fits_of: Callable[[FloatArray], BoolArray]) -> float:
 
 def _ramps_use(
     curve: JointCurve,
-    spans: tuple[Span, ...],
+    spans: tuple[StrokeSpan, ...],
     k: int,
     durations: FloatArray,
     limits: MotionLimits,

@@ -18,7 +18,7 @@ import numpy as np
 
 from ir_description import AXIS_UNITS, IDLE, LINK, PowerParameters, drawn_robots, interval_over
 from ir_kernels import DcBus, dc_bus, portable
-from ir_msgs_py.trajectory import JointTrajectory, Samples
+from ir_msgs_py.trajectory import JointTrajectory, MotionSamples
 from ir_planner.curves import motion_at
 from ir_planner.scene import CENTRE_STEP, RUNNING, PlanningScene
 from ir_values.arrays import FloatArray
@@ -31,7 +31,7 @@ _MOST = 20_000  # samples: what lasts longer is sampled more coarsely
 class Sampled:
     """A motion at the middles of N steps of dt s, and how long it takes [s]."""
 
-    motion: Samples
+    motion: MotionSamples
     dt: float
     span: float
 
@@ -85,7 +85,7 @@ def _drawn(bus: DcBus, dt: float) -> float:
 def holding_slope(q: FloatArray, scene: PlanningScene) -> FloatArray:
     """d watts / d parameter (P,) of motors that hold the arm still at q (n,), W per unit."""
     rest = np.zeros((1, len(q)))
-    motion = Samples(q[None], rest, rest, rest)
+    motion = MotionSamples(q[None], rest, rest, rest)
     torque = scene.dynamics.inverse_dynamics(q[None], rest, rest)
     efficiency = scene.drives.rectifier_efficiency
     slope = _axis_slope(_States(motion, torque, np.full((1, len(q)), 1.0 / efficiency)), scene)
@@ -111,7 +111,7 @@ def standing_slope(
 class _States:
     """motion, torque (N, n) Nm, and price (N, n): mains joules per watt of an axis in a sample."""
 
-    motion: Samples
+    motion: MotionSamples
     torque: FloatArray
     price: FloatArray
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ir_kernels import Extrema, polynomial_extrema, polynomial_samples, portable
-from ir_msgs_py.trajectory import JointTrajectory, Samples
+from ir_msgs_py.trajectory import JointTrajectory, MotionSamples
 from ir_values.arrays import BoolArray, FloatArray
 
 # rad: what higher powers may add to a cubic, as a point per knot of a spline rounds them
@@ -160,10 +160,10 @@ def _with_ends(points: FloatArray) -> FloatArray:
     return np.concatenate([np.zeros((rows, 1)), points, np.ones((rows, 1))], axis=1)
 
 
-def motion_at(trajectory: JointTrajectory, times: NDArray[np.floating]) -> Samples:
+def motion_at(trajectory: JointTrajectory, times: NDArray[np.floating]) -> MotionSamples:
     """q, qd, qdd (M, n) at times (M,) s within the trajectory; jerk (0, n) is left out."""
     coefficients, durations = trajectory.coefficients()
     if len(durations) == 0:
         return trajectory.sample(times)
     found = polynomial_samples(coefficients, durations, trajectory.times[:-1], times)
-    return Samples(*found, np.zeros((0, coefficients.shape[1])))
+    return MotionSamples(*found, np.zeros((0, coefficients.shape[1])))

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_planner.cycle.linear import LinearProgram
-from ir_planner.cycle.steady import Curve, Wait, WaitMode
+from ir_planner.cycle.steady import Curve, ModeWait, WaitMode
 from ir_values import FloatArray
 
 _NO_WAIT = 1e-6  # s
@@ -62,7 +62,7 @@ class ZoneStretch:
 
 
 @dataclass(frozen=True, order=True)
-class Zone:
+class ExclusiveZone:
     """Two stretches that never go on at the same time. first: robots that have to pass it before
     the other one in every cycle; of both, no cycle is possible.
     """
@@ -80,7 +80,7 @@ class ArmSchedule:
 
     begin: tuple[float, ...]
     seconds: tuple[float, ...]
-    waits: tuple[tuple[Wait, ...], ...]
+    waits: tuple[tuple[ModeWait, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class JointCycle:
     later: tuple[bool, ...]
 
 
-def shortest_joint(works: Sequence[ArmWork], zones: Sequence[Zone]) -> JointCycle | None:
+def shortest_joint(works: Sequence[ArmWork], zones: Sequence[ExclusiveZone]) -> JointCycle | None:
     """The shortest cycle; None where the zones leave none."""
     alone = max(work.shortest for work in works)
     together = sum(work.shortest for work in works)
@@ -106,7 +106,7 @@ def shortest_joint(works: Sequence[ArmWork], zones: Sequence[Zone]) -> JointCycl
 
 
 def cheapest_joint(
-    works: Sequence[ArmWork], zones: Sequence[Zone], period: float
+    works: Sequence[ArmWork], zones: Sequence[ExclusiveZone], period: float
 ) -> JointCycle | None:
     """The cycle of least energy within a period [s]; None where there is none."""
     model = _Model(works, zones, (period, period))
@@ -117,7 +117,7 @@ class _Model:
     """The mixed-integer linear program."""
 
     def __init__(
-        self, works: Sequence[ArmWork], zones: Sequence[Zone], period: tuple[float, float]
+        self, works: Sequence[ArmWork], zones: Sequence[ExclusiveZone], period: tuple[float, float]
     ) -> None:
         self._works = works
         self._zones = zones
@@ -192,7 +192,7 @@ class _Model:
             terms[part] = 1.0
         return terms, work.movements[last % count].seconds[0]
 
-    def _of_zone(self, zone: Zone) -> int:
+    def _of_zone(self, zone: ExclusiveZone) -> int:
         """Whether the second stretch is before the first one: it is passed in the period before."""
         program = self._program
         later = program.binary()
@@ -235,11 +235,11 @@ class _Model:
             curve.seconds[0] + sum(float(values[part]) for part, _ in parts)
             for curve, parts in zip(work.movements, self._parts[robot], strict=True)
         )
-        waits: list[tuple[Wait, ...]] = []
+        waits: list[tuple[ModeWait, ...]] = []
         for options in self._waits[robot]:
             taken = next(each for each in options if values[each[0]] > 0.5)
             length = float(values[taken[1]])
-            waits.append((Wait(taken[2].name, length),) if length > _NO_WAIT else ())
+            waits.append((ModeWait(taken[2].name, length),) if length > _NO_WAIT else ())
         return ArmSchedule(begins, seconds, (waits[-1], *waits[:-1]))
 
 
@@ -253,7 +253,7 @@ def zones_of(
     robots: tuple[int, int],
     counts: tuple[int, int],
     meeting: Mapping[tuple[int, int], Iterable[int]],
-) -> tuple[Zone, ...]:
+) -> tuple[ExclusiveZone, ...]:
     """Zones of two robots of `counts` movements. meeting: pairs of activities that could meet, with
     the robots that have to pass first; where a stop could, so must the movements beside it. A zone
     whose stretch is a whole program is passed by no cycle.
@@ -298,13 +298,13 @@ class _Group:
         other = _joined(self.other, group.other, around[1])
         return _Group(one, other, self.first | group.first)
 
-    def zone(self, robots: tuple[int, int], counts: tuple[int, int]) -> Zone:
+    def zone(self, robots: tuple[int, int], counts: tuple[int, int]) -> ExclusiveZone:
         """The same in movements."""
         stretches = [
             ZoneStretch(robot, span[0] // 2, min((span[1] + span[0] % 2 + 1) // 2, count))
             for robot, span, count in zip(robots, (self.one, self.other), counts, strict=True)
         ]
-        return Zone(stretches[0], stretches[1], tuple(sorted(self.first)))
+        return ExclusiveZone(stretches[0], stretches[1], tuple(sorted(self.first)))
 
 
 def _nearness(one: Span, other: Span, around: int) -> int:

@@ -144,7 +144,7 @@ class SteadyProblem:
 
 
 @dataclass(frozen=True)
-class Wait:
+class ModeWait:
     """A wait [s] in a power mode."""
 
     mode: str
@@ -162,8 +162,8 @@ class Visit:
     start: float
     seconds: float
     hop: float
-    before: tuple[Wait, ...]
-    after: tuple[Wait, ...]
+    before: tuple[ModeWait, ...]
+    after: tuple[ModeWait, ...]
 
 
 @dataclass(frozen=True)
@@ -427,9 +427,9 @@ class _Model:
             tuple(visits), float(values[self.period]), self.units, answer.cost, answer.bound
         )
 
-    def _waited(self, where: str, node: Node, values: FloatArray) -> tuple[Wait, ...]:
+    def _waited(self, where: str, node: Node, values: FloatArray) -> tuple[ModeWait, ...]:
         return tuple(
-            Wait(mode.name, float(values[seconds]))
+            ModeWait(mode.name, float(values[seconds]))
             for mode, chosen, seconds in self.waits[where, node]
             if values[chosen] > 0.5 and values[seconds] > 0.0
         )

@@ -19,12 +19,12 @@ from ir_planner.program import (
     HopPart,
     Ladder,
     Movements,
-    Node,
     PlacedStep,
     ProgramRequest,
     Route,
     Scenes,
     StageError,
+    StopNode,
     TimeValues,
     cheapest_chain,
     nobody,
@@ -80,8 +80,8 @@ class TendedRoute:
     cell: Cell
     route: PartRoute
     scenes: Scenes
-    nodes: Mapping[str, Node]
-    choices: Mapping[str, list[Node]]
+    nodes: Mapping[str, StopNode]
+    choices: Mapping[str, list[StopNode]]
     columns: Mapping[Key, MovementColumn]
 
     @property
@@ -168,7 +168,7 @@ def _parts(hops: Sequence[tuple[str, str, PartPlaces]]) -> dict[HopPart, Key]:
 
 def _choices(
     request: ProgramRequest, route: PartRoute, scenes: Scenes, context: Context
-) -> dict[str, list[Node]]:
+) -> dict[str, list[StopNode]]:
     """Configurations at every station that can be entered and left, loaded and empty."""
     settings = request.settings
     exits = exit_searches(settings.withdrawal)
@@ -194,8 +194,8 @@ def _configurations(
     route: PartRoute,
     scenes: Scenes,
     context: Context,
-    choices: Mapping[str, list[Node]],
-) -> dict[str, Node]:
+    choices: Mapping[str, list[StopNode]],
+) -> dict[str, StopNode]:
     """The configuration at each station along the cheapest chain of a part through its route and
     back empty.
     """
@@ -207,7 +207,7 @@ def _configurations(
         steps.append(PlacedStep(ProgramStep("STATION", name), places, places))
     steps.append(PlacedStep(ProgramStep("STATION", visits[0]), lying, lying))
     layers = [
-        [Node(ServiceLine(request.start[None]))],
+        [StopNode(ServiceLine(request.start[None]))],
         *(choices[name] for name in visits),
         choices[visits[0]],
     ]

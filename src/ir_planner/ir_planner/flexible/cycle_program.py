@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from ir_description import Cell, PartRoute, ProgramStep
-from ir_planner.cycle import SteadyCycle, Visit, Wait
+from ir_planner.cycle import ModeWait, SteadyCycle, Visit
 from ir_planner.flexible.tending_cell import (
     front_name,
     machines_of,
@@ -88,7 +88,7 @@ def _due(
     return None
 
 
-def _length(waits: Sequence[Wait]) -> float:
+def _length(waits: Sequence[ModeWait]) -> float:
     return sum(wait.seconds for wait in waits)
 
 
@@ -110,7 +110,9 @@ def cycle_program(cell: Cell, cycle: SteadyCycle) -> tuple[ProgramStep, ...]:
     return tuple(line.steps)
 
 
-def _since(waits: Sequence[Wait], due: Due | None, names: Sequence[str]) -> list[tuple[float, str]]:
+def _since(
+    waits: Sequence[ModeWait], due: Due | None, names: Sequence[str]
+) -> list[tuple[float, str]]:
     return [(wait.seconds, start_of(names[due.place]) if due else "") for wait in waits]
 
 
@@ -220,7 +222,7 @@ def _performed(cycle: SteadyCycle, last: int, cycles: int) -> Iterator[tuple[Vis
         yield from ((visit, full) for visit in done)
 
 
-def _wait(line: _Line, waits: Sequence[Wait], due: Due | None, *, full: bool) -> None:
+def _wait(line: _Line, waits: Sequence[ModeWait], due: Due | None, *, full: bool) -> None:
     """A wait of the cycle as long as it is now; one that only fills the cycle has its length in
     whole cycles.
     """

@@ -11,7 +11,7 @@ from ir_description import Cell, ProgramStep
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import interval
-from ir_planner.cycle import SteadyCycle, Visit, Wait
+from ir_planner.cycle import ModeWait, SteadyCycle, Visit
 from ir_planner.flexible.columns import TendedRoute, UnitKey, activity_keys, exact
 from ir_planner.flexible.cycle_program import CycleLengths, cycle_program, occupied, run_program
 from ir_planner.flexible.tending_cell import (
@@ -28,13 +28,13 @@ from ir_planner.program import (
     HopPart,
     Ladder,
     Movements,
-    Node,
     ProgramRequest,
     Route,
     Scenes,
     Spreads,
     StageError,
     StationChain,
+    StopNode,
     common_program,
     placed_steps,
     rests_at,
@@ -96,19 +96,19 @@ class RouteSteps:
     def along(
         self,
         program: tuple[ProgramStep, ...],
-        nodes: Mapping[str, Sequence[Node]],
+        nodes: Mapping[str, Sequence[StopNode]],
         context: Context,
     ) -> Choice:
         """A program over configurations at the stations; it ends where it starts."""
         steps = placed_steps(self.cell, program, self.cell.parts_at_start(), self.request.doors)
         route = Route.over(steps, self._scenes)
-        begin = Node(ServiceLine(self.request.start[None]))
+        begin = StopNode(ServiceLine(self.request.start[None]))
         layers = [[begin]]
         for place in range(len(route)):
             name = route.name(place)
             if name in self._names:
                 at = nodes[self._names[name]]
-                layers.append([Node(ServiceLine(node.departure[None])) for node in at])
+                layers.append([StopNode(ServiceLine(node.departure[None])) for node in at])
             else:
                 layers.append(list(nodes[name]))
         layers[-1] = [begin]
@@ -233,7 +233,7 @@ class CycleSteps:
         }
         return CycleLengths(activities, hops)
 
-    def _along(self, cycle: SteadyCycle, nodes: Mapping[str, Sequence[Node]]) -> Choice:
+    def _along(self, cycle: SteadyCycle, nodes: Mapping[str, Sequence[StopNode]]) -> Choice:
         return self._route.along(cycle_program(self._route.cell, cycle), nodes, self._context)
 
     def saving(self, spreads: Spreads) -> CycleSaving:
@@ -297,7 +297,7 @@ class CycleSteps:
         here = 0.0
         for k, visit in enumerate(visits):
             here += float(waits[k]) if k else 0.0
-            before = (Wait(MOTORS, float(waits[k])),) if waits[k] > 0.0 else ()
+            before = (ModeWait(MOTORS, float(waits[k])),) if waits[k] > 0.0 else ()
             again.append(Visit(visit.activity, visit.unit, here, *lengths[k], before, ()))
             here += sum(lengths[k])
         period = max(period, self._cycle.period)

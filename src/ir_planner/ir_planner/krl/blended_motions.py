@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from ir_kernels import portable
-from ir_krl import Blend, KrlMotionError, Motion, Place, Speeds, Target
+from ir_krl import Blend, KrlMotionError, Motion, SourcePlace, Speeds, Target
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.cartesian import Arc, Line, arc_through
 from ir_planner.curves import turn_of, turned_evenly
@@ -238,7 +238,7 @@ def move(
     speeds: Speeds,
     scene: PlanningScene,
     target: Target,
-    place: Place,
+    place: SourcePlace,
     *,
     least: float = 0.0,
     jerk_share: float = 1.0,

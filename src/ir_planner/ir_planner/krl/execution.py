@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ir_krl import (
+    AdvanceStop,
     Blend,
     Command,
     Effect,
@@ -16,14 +17,13 @@ from ir_krl import (
     Motion,
     Note,
     Payload,
-    Place,
     SetOutput,
+    SourcePlace,
     Speeds,
     SplineBlock,
-    Stop,
+    StandStill,
     Target,
-    Wait,
-    WaitFor,
+    WaitForCondition,
 )
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.trajectory import NS_PER_S, JointTrajectory
@@ -112,11 +112,11 @@ class DrivenStep:
 
     trajectory: JointTrajectory
     moves: bool
-    places: tuple[Place, ...]
+    places: tuple[SourcePlace, ...]
     outputs: tuple[Switched, ...] = ()
     waits_for: str = ""
     tool: tuple[ToolMotion | None, ...] = ()
-    process: tuple[Place, ...] = ()
+    process: tuple[SourcePlace, ...] = ()
     handled: str = ""
     awaited: tuple[Signal, ...] = ()
     signals: tuple[Signal, ...] = ()
@@ -216,9 +216,9 @@ class _Drive:
     _payload: Payload | None = None  # of the last motion
 
     def __post_init__(self) -> None:
-        self._among(self.around.scene(None, Place()))
+        self._among(self.around.scene(None, SourcePlace()))
 
-    def _carry(self, payload: Payload | None, place: Place) -> None:
+    def _carry(self, payload: Payload | None, place: SourcePlace) -> None:
         """What the motions from here on carry."""
         self._payload = payload
         self._among(self.around.scene(payload, place))
@@ -242,13 +242,13 @@ class _Drive:
             case SetOutput():
                 self.finish()
                 self._set(command)
-            case Wait():
+            case StandStill():
                 self.finish()
                 self._stand(command.seconds, command.place, "")
                 self.around.stood(command.seconds)
-            case Stop():
+            case AdvanceStop():
                 self.finish()
-            case WaitFor():
+            case WaitForCondition():
                 self.finish()
                 self._stand(0.0, command.place, command.condition)
                 signals = self.around.awaited(command.condition)
@@ -498,7 +498,7 @@ class _Drive:
             self.finish()
 
     def _stand(
-        self, seconds: float, place: Place, condition: str, q: FloatArray | None = None
+        self, seconds: float, place: SourcePlace, condition: str, q: FloatArray | None = None
     ) -> None:
         """Stand where the motions so far lead, or at q (n,)."""
         self._carry(self._payload, place)
@@ -509,13 +509,13 @@ class _Drive:
     def _step(
         self,
         driven: JointTrajectory,
-        places: tuple[Place, ...],
+        places: tuple[SourcePlace, ...],
         events: Sequence[_Event],
         *,
         moves: bool,
         waits_for: str = "",
         tool: tuple[ToolMotion | None, ...] = (),
-        process: tuple[Place, ...] = (),
+        process: tuple[SourcePlace, ...] = (),
     ) -> None:
         """A step, cut where what it moves among changes in its course."""
         self._before(driven, places[0], events)
@@ -553,7 +553,9 @@ class _Drive:
         for output, listed in at_end:
             self._set(output, listed=listed)
 
-    def _before(self, driven: JointTrajectory, place: Place, events: Sequence[_Event]) -> None:
+    def _before(
+        self, driven: JointTrajectory, place: SourcePlace, events: Sequence[_Event]
+    ) -> None:
         """What is set where a step begins, before it."""
         carried = self._payload
         for one in events:

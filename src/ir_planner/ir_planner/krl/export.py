@@ -51,7 +51,7 @@ from ir_planner.krl.step_evaluation import ReadBack, StepEvaluator, called, poin
 from ir_planner.krl.strokes import deviation_along, fitted_path, one_after_the_other
 from ir_planner.krl.surroundings import Surroundings, payload_of
 from ir_planner.krl.timed_splines import DEVIATION_MAX, deviation_in_time, fitted_spline
-from ir_planner.program import Charge, Pause, spent, switch_times
+from ir_planner.program import Charge, PlannedPause, spent, switch_times
 from ir_planner.scene import STILL, PlanningScene
 from ir_values.arrays import FloatArray
 
@@ -307,7 +307,7 @@ class _Job:
             scene = self._evaluator.scene(step)
             if step.is_pause:
                 mode = self._pauses[id(step)].power_mode if id(step) in self._pauses else ""
-                pause = Pause(step.to_station, step.duration, mode, here, scene)
+                pause = PlannedPause(step.to_station, step.duration, mode, here, scene)
                 stood = charge.stood(spent(pause, self._times), pause)
                 after.append(replace(step, report=stood.report, power_mode=mode))
                 continue

@@ -7,7 +7,7 @@ import numpy as np
 
 from ir_description.poses import abc_from_rotation, inverse, rotation_from_abc
 from ir_kernels import Chain, portable
-from ir_krl import FRAME_NAMES, Effect, KrlMotionError, Note, Place, Target
+from ir_krl import FRAME_NAMES, Effect, KrlMotionError, Note, SourcePlace, Target
 from ir_planner.scene import PlanningScene
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
@@ -149,7 +149,7 @@ class Arm:
         found = self.scene.inverse_kinematics.solve(tcp)
         return [found.of_pose(k) for k in range(len(poses))]
 
-    def reached(self, target: Target, q: FloatArray, place: Place) -> FloatArray:
+    def reached(self, target: Target, q: FloatArray, place: SourcePlace) -> FloatArray:
         """The configuration (n,) that a PTP from q (n,) to the target ends in. Raises
         KrlMotionError.
         """
@@ -191,7 +191,7 @@ class Arm:
             )
         return np.asarray(fits[np.argmin(np.abs(fits - q).max(axis=1))])
 
-    def _check_limits(self, q: FloatArray, target: Target, place: Place) -> None:
+    def _check_limits(self, q: FloatArray, target: Target, place: SourcePlace) -> None:
         robot = self.scene.cell.robot
         beyond = np.flatnonzero(
             (q < robot.position_min - _WITHIN) | (q > robot.position_max + _WITHIN)

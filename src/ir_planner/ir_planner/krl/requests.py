@@ -14,10 +14,10 @@ from ir_krl import (
     KrlError,
     KrlMotionError,
     Note,
-    Place,
     PlcPause,
     SignalRange,
-    Source,
+    SourceFile,
+    SourcePlace,
     follow,
     frame_numbers,
     parse,
@@ -37,7 +37,7 @@ from ir_planner.krl.makes import joint_limits
 from ir_planner.krl.step_evaluation import evaluator_of
 from ir_planner.krl.surroundings import Surroundings, wires_of
 from ir_planner.planner import Planner
-from ir_planner.program import Charge, Pause, Scenes, spent
+from ir_planner.program import Charge, PlannedPause, Scenes, spent
 from ir_planner.request import POSTURES, safety_distance
 from ir_planner.scene import PlanningScene, load_text
 from ir_planner.timing import standing
@@ -148,7 +148,7 @@ def evaluate_program(
             "pauses that the PLC spends in power modes are costed as the controller spends them by "
             "itself: without the PLC's table"
         )
-        notes = (Note(Place(program.name), sentence), *notes)
+        notes = (Note(SourcePlace(program.name), sentence), *notes)
     elapsed = np.cumsum([0.0, *(step.report.duration for step in steps)])[:-1]
     report = total_report(tuple(step.report for step in steps), tuple(elapsed.tolist()))
     stations = tuple(step.to_station for step in steps if step.step.moves and step.to_station)
@@ -176,7 +176,7 @@ def _evaluated(
         )
         report = charge.moved(planned, found.energy, scene).report
     else:
-        pause = Pause(last, step.trajectory.duration, mode, ends[1], scene)
+        pause = PlannedPause(last, step.trajectory.duration, mode, ends[1], scene)
         paid = charge.stood(spent(pause, times), pause).report
         report = replace(
             found.report, energy=paid.energy, base_energy=paid.energy, peak_power=paid.peak_power
@@ -191,12 +191,12 @@ ASYNCHRONOUS = "asynchronous"
 
 def follow_krl(
     planner: Planner,
-    sources: Sequence[Source],
+    sources: Sequence[SourceFile],
     *,
     routine: str = "",
     inputs: Mapping[int, bool] | None = None,
     loop_passes: int = 1,
-    settings: Sequence[Source] = (),
+    settings: Sequence[SourceFile] = (),
 ) -> Followed:
     """A program followed as `ir_krl.follow` does, by the planner's robot: its home, its tool, where
     its motions lead. Raises KrlError with the place.

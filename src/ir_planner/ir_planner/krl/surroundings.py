@@ -11,7 +11,7 @@ import numpy as np
 from ir_description import Cell, InvalidValueError, Load, PartPlaces, ProgramStep, Signal
 from ir_description.poses import abc_from_rotation, rotation_from_abc
 from ir_kernels import portable
-from ir_krl import GRIP, Effect, KrlMotionError, Note, Payload, Place, SignalRange
+from ir_krl import GRIP, Effect, KrlMotionError, Note, Payload, SignalRange, SourcePlace
 from ir_planner.krl.geometry import tool_in_flange
 from ir_planner.program import Doors, Scenes, doors_along
 from ir_planner.scene import PlanningScene
@@ -60,7 +60,7 @@ def is_named(load: Load) -> bool:
     return load.name == LOAD_NAME
 
 
-def whole_load(loads: tuple[Load, ...], place: Place) -> Load:
+def whole_load(loads: tuple[Load, ...], place: SourcePlace) -> Load:
     """Loads as one, with their shapes and watts."""
     if len(loads) == 1:
         return loads[0]
@@ -68,7 +68,7 @@ def whole_load(loads: tuple[Load, ...], place: Place) -> Load:
     return one
 
 
-def loads_with(payload: Payload, loads: tuple[Load, ...], place: Place) -> tuple[Load, ...]:
+def loads_with(payload: Payload, loads: tuple[Load, ...], place: SourcePlace) -> tuple[Load, ...]:
     """The loads of the cell with the mass, centre and inertia that a program gives them; their
     shapes and watts stay. Raises KrlMotionError for an inertia that no body has.
     """
@@ -164,7 +164,7 @@ class Surroundings:
     notes: list[Note] = field(default_factory=list)
     _with_load: dict[tuple[int, Payload], PlanningScene] = field(default_factory=dict)
 
-    def scene(self, payload: Payload | None, place: Place) -> PlanningScene:
+    def scene(self, payload: Payload | None, place: SourcePlace) -> PlanningScene:
         """The scene of a motion with this $LOAD."""
         scene = self.fixed or self.scenes.of(self.places, self.doors)
         if payload is None or payload.mass < 0.0:
@@ -203,7 +203,7 @@ class Surroundings:
         self._next(ProgramStep("POSTURE", "home", set_signals=signals))
         return signals
 
-    def gripped(self, number: int, value: bool, q: FloatArray, place: Place) -> str:
+    def gripped(self, number: int, value: bool, q: FloatArray, place: SourcePlace) -> str:
         """An output is set where the robot stands at q (n,); the part that the gripper takes or
         leaves, with "+" or "-", "" for none.
         """
@@ -229,14 +229,14 @@ class Surroundings:
         lies = there in self.places.lying.values()
         return lies and not self.places.held if value else bool(self.places.held)
 
-    def _taken(self, station: str, place: Place) -> str:
+    def _taken(self, station: str, place: SourcePlace) -> str:
         lying = [part for part, at in self.places.lying.items() if station and at == station]
         if self.places.held or not lying:
             return ""
         self.places = self.places.after(ProgramStep("STATION", station, attach=lying[0]))
         return f"+{lying[0]}"
 
-    def _left(self, station: str, place: Place) -> str:
+    def _left(self, station: str, place: SourcePlace) -> str:
         held = self.places.held
         if not held:
             return ""

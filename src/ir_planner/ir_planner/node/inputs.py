@@ -26,7 +26,7 @@ from ir_msgs_py.ros.conversions import (
 )
 from ir_msgs_py.ros.plan_conversions import plan_options_from_msg
 from ir_msgs_py.status import StatusCode
-from ir_msgs_py.trajectory import JointTrajectory, Samples
+from ir_msgs_py.trajectory import JointTrajectory, MotionSamples
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
 from ir_planner.request import POSITION_MAX, Goal, motion_on, one_goal
@@ -289,7 +289,7 @@ def _end_motion(msg: Any, acceleration: Sequence[float], what: str, cell: Cell) 
     return velocity, in_order
 
 
-def joined_motion(request: Any, planner: Planner) -> Samples | None:
+def joined_motion(request: Any, planner: Planner) -> MotionSamples | None:
     """Where and in which motion (1, n) a regional movement leaves the trajectory that is driven;
     None where it joins none. Raises RequestError.
     """

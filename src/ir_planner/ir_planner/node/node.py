@@ -64,7 +64,7 @@ from ir_planner.node.answers import fill_status
 from ir_planner.node.goal_queue import GoalQueue
 from ir_planner.node.inputs import LastState, has_joints, measured_velocity, of_joints
 from ir_planner.node.requests import Requests
-from ir_planner.node.topics import Announcements, ShownMarkers
+from ir_planner.node.topics import PlannerAnnouncements, ShownMarkers
 from ir_planner.planner import Planner
 from ir_planner.service import ServicePlan, service_shapes
 from ir_planner.settings import PlannerSettings
@@ -120,7 +120,7 @@ class PlannerNode(Node):
         self._shown = ShownMarkers()
         self._quick = MutuallyExclusiveCallbackGroup()
         self._long = MutuallyExclusiveCallbackGroup()
-        self._announcements = Announcements(self, self.planner, self._quick)
+        self._announcements = PlannerAnnouncements(self, self.planner, self._quick)
         self._goals = GoalQueue(self._execute_plan, self._refuse_plan, _GOALS_WAITING)
         self._offer()
         self._states = LatestMessage(self, JointState, names.JOINT_STATES, _PUBLISHERS)

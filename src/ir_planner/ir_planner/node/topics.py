@@ -34,7 +34,7 @@ from ir_values.errors import IrError
 _T = TypeVar("_T")
 
 
-class Announcements:
+class PlannerAnnouncements:
     """Publishes the planner's cell, and lets the planner hear what a driver publishes while there
     is one.
     """

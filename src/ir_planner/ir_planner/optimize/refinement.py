@@ -50,7 +50,7 @@ NEGLIGIBLE = 5e-3  # share of the cost
 
 
 @dataclass(frozen=True)
-class Stage:
+class DescentStage:
     """One descent: halvings of the coarse spline's intervals (level), W over which the switch of
     the bus is rounded, stiffness of the penalties, evaluations of the cost, and the gain of ten
     steps that ends it.
@@ -67,24 +67,24 @@ class Stage:
 class Effort:
     """The stages of a refinement, the coarse one first."""
 
-    stages: tuple[Stage, ...]
+    stages: tuple[DescentStage, ...]
 
     @property
     def coarse(self) -> int:
         """Evaluations on the coarse spline."""
         return self.stages[0].evaluations
 
-    def after(self, level: int) -> Iterator[Stage]:
+    def after(self, level: int) -> Iterator[DescentStage]:
         """The stages on finer splines."""
         return (stage for stage in self.stages if stage.level > level)
 
     @property
-    def last(self) -> Stage:
+    def last(self) -> DescentStage:
         """With penalties as stiff as they get."""
         return self.stages[-1]
 
 
-def decisive(stage: Stage, last: Stage, rounding: float) -> Stage:
+def decisive(stage: DescentStage, last: DescentStage, rounding: float) -> DescentStage:
     """The stage itself, or the last one at once where the rounding of the bus, in shares of the
     cost per W of smoothing, doesn't matter any more.
     """
@@ -93,19 +93,19 @@ def decisive(stage: Stage, last: Stage, rounding: float) -> Stage:
 
 QUICK = Effort(
     (
-        Stage(0, 200.0, 1.0, 50, 1e-4),
-        Stage(1, 60.0, 2.0, 60, 1e-4),
-        Stage(2, 10.0, 8.0, 40, 1e-4),
-        Stage(2, 2.0, 40.0, 30, 1e-4),
+        DescentStage(0, 200.0, 1.0, 50, 1e-4),
+        DescentStage(1, 60.0, 2.0, 60, 1e-4),
+        DescentStage(2, 10.0, 8.0, 40, 1e-4),
+        DescentStage(2, 2.0, 40.0, 30, 1e-4),
     )
 )
 THOROUGH = Effort(
     (
-        Stage(0, 200.0, 1.0, 80, 5e-5),
-        Stage(1, 60.0, 2.0, 200, 2e-5),
-        Stage(2, 20.0, 4.0, 100, 5e-5),
-        Stage(2, 5.0, 16.0, 80, 5e-5),
-        Stage(2, 1.5, 40.0, 60, 5e-5),
+        DescentStage(0, 200.0, 1.0, 80, 5e-5),
+        DescentStage(1, 60.0, 2.0, 200, 2e-5),
+        DescentStage(2, 20.0, 4.0, 100, 5e-5),
+        DescentStage(2, 5.0, 16.0, 80, 5e-5),
+        DescentStage(2, 1.5, 40.0, 60, 5e-5),
     )
 )
 # Where a duration is requested, joules alone can be saved. Movements of few joules need long
@@ -117,7 +117,7 @@ EXACT = Effort(
             replace(stage, evaluations=3 * stage.evaluations, tolerance=stage.tolerance / 5)
             for stage in THOROUGH.stages
         ),
-        Stage(3, 0.3, 40.0, 300, 1e-5),
+        DescentStage(3, 0.3, 40.0, 300, 1e-5),
     )
 )
 
@@ -201,7 +201,7 @@ class Solution:
     """
 
     spline: UniformSpline
-    stage: Stage
+    stage: DescentStage
     cost: float
     kept: FloatArray
     speed: float = 1.0
@@ -371,7 +371,7 @@ class Refinement:
             solution = self._repaired(wider, path, _REPAIR_EVALUATIONS)
         return None
 
-    def staged(self, solution: Solution, stage: Stage, path: FloatArray) -> Solution:
+    def staged(self, solution: Solution, stage: DescentStage, path: FloatArray) -> Solution:
         """The descent of a stage along a path (N, n), on a spline as fine as it asks for."""
         spline = solution.spline
         for _ in range(stage.level - solution.stage.level):

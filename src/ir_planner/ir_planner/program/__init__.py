@@ -5,13 +5,13 @@ modes.
 from ir_planner.program.chain import cheapest_chain
 from ir_planner.program.choice import Choice
 from ir_planner.program.more_work import chosen
-from ir_planner.program.movement_fronts import Ladder, Point, TimeValues
+from ir_planner.program.movement_fronts import FrontPoint, Ladder, TimeValues
 from ir_planner.program.movements import Movements
 from ir_planner.program.pauses import (
     AUTO,
     MOTORS,
     Charge,
-    Pause,
+    PlannedPause,
     Rests,
     Steps,
     at_once,
@@ -51,7 +51,7 @@ from ir_planner.program.steps import (
     placed_steps,
     with_doors,
 )
-from ir_planner.program.stops import Node, station_nodes
+from ir_planner.program.stops import StopNode, station_nodes
 
 __all__ = [
     "ACROSS",
@@ -62,15 +62,14 @@ __all__ = [
     "Charge",
     "Choice",
     "Doors",
+    "FrontPoint",
     "HopPart",
     "Ladder",
     "Movements",
-    "Node",
     "Outlook",
-    "Pause",
     "PauseLengths",
     "PlacedStep",
-    "Point",
+    "PlannedPause",
     "ProgramPlan",
     "ProgramRequest",
     "Progress",
@@ -82,6 +81,7 @@ __all__ = [
     "Standby",
     "StationChain",
     "Steps",
+    "StopNode",
     "TimeValues",
     "Timeouts",
     "Trip",

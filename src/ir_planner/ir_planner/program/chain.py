@@ -15,14 +15,14 @@ from ir_planner.program.station_graph import (
     ACROSS,
     ENTER,
     LEAVE,
-    Hop,
+    HopBounds,
     HopPart,
     Settled,
     StationChain,
     StationGraph,
 )
 from ir_planner.program.steps import Route
-from ir_planner.program.stops import Node, path_nodes, posture_nodes, station_nodes
+from ir_planner.program.stops import StopNode, path_nodes, posture_nodes, station_nodes
 from ir_planner.request import Context
 from ir_planner.scene import STILL, movement_cost, path_cost
 from ir_planner.service import ExitSearch, ServiceLine
@@ -54,25 +54,25 @@ class CostEdges:
         self._costs: dict[Turned, float] = {}
         self._coarse_found: dict[tuple[int, bytes, bytes], float] = {}
 
-    def hops(self) -> list[Hop]:
+    def hops(self) -> list[HopBounds]:
         """All hops with what physics demands of their parts."""
         layers = self.movements.layers
         route = self.movements.route
         return [self._hop(hop, layers[hop], layers[hop + 1]) for hop in range(len(route))]
 
-    def _hop(self, hop: int, first: list[Node], second: list[Node]) -> Hop:
+    def _hop(self, hop: int, first: list[StopNode], second: list[StopNode]) -> HopBounds:
         context = self.movements.context.inside(self.movements.route.arriving(hop))
         scene = context.scene
         limits = context.limits
         across = least_cost(_departures(first), _arrivals(second), scene, limits, self.rates)
 
-        def lines(nodes: list[Node], *, entry: bool) -> FloatArray:
+        def lines(nodes: list[StopNode], *, entry: bool) -> FloatArray:
             work = np.array([node.interaction for node in nodes])
             ends = (_arrivals(nodes), work) if entry else (work, _departures(nodes))
             costs = least_cost(ends[0], ends[1], scene, limits, self.rates)
             return np.asarray(np.diagonal(costs))
 
-        bounds = Hop(lines(first, entry=False), across, lines(second, entry=True))
+        bounds = HopBounds(lines(first, entry=False), across, lines(second, entry=True))
         paths = [
             HopPart(hop, ENTER, -1, k) for k, node in enumerate(second) if node.driven is not None
         ]
@@ -165,20 +165,22 @@ class TravelEdges:
         ]
         self._blocked: set[HopPart] = set()
 
-    def hops(self) -> list[Hop]:
+    def hops(self) -> list[HopBounds]:
         """All hops with W of the straight segments and of the service lines' points."""
         layers = self.movements.layers
         route = self.movements.route
         return [self._hop(route, hop, layers[hop], layers[hop + 1]) for hop in range(len(route))]
 
-    def _hop(self, route: Route, k: int, first: list[Node], second: list[Node]) -> Hop:
+    def _hop(
+        self, route: Route, k: int, first: list[StopNode], second: list[StopNode]
+    ) -> HopBounds:
         weights = route.arriving(k).weights
         leave, enter = (
             np.array([path_cost(weights, node.line.points) for node in nodes])
             for nodes in (first, second)
         )
         across = movement_cost(weights, _departures(first)[:, None], _arrivals(second)[None])
-        return _with_standing_parts(Hop(leave, across, enter), first, second)
+        return _with_standing_parts(HopBounds(leave, across, enter), first, second)
 
     def settle(self, parts: list[HopPart]) -> list[Settled]:
         """W of straight segments where they are free, which is exact; else, asked again, and of
@@ -219,15 +221,17 @@ def _turned(q: FloatArray) -> bytes:
     return np.round(np.stack([portable.sin(q), portable.cos(q)]), 6).tobytes()
 
 
-def _arrivals(nodes: list[Node]) -> FloatArray:
+def _arrivals(nodes: list[StopNode]) -> FloatArray:
     return np.array([node.arrival for node in nodes])
 
 
-def _departures(nodes: list[Node]) -> FloatArray:
+def _departures(nodes: list[StopNode]) -> FloatArray:
     return np.array([node.departure for node in nodes])
 
 
-def _with_standing_parts(hop: Hop, first: list[Node], second: list[Node]) -> Hop:
+def _with_standing_parts(
+    hop: HopBounds, first: list[StopNode], second: list[StopNode]
+) -> HopBounds:
     """The hop, its parts in which nothing moves known to cost nothing."""
     away = np.abs(_departures(first)[:, None] - _arrivals(second)[None]).max(axis=2)
     hop.nothing(ACROSS, away <= STILL)
@@ -259,12 +263,12 @@ def layers_of(
     searches: Mapping[str, ExitSearch],
     progress: Progress,
     interaction: InteractionSettings = INTERACTION,
-) -> list[list[Node]]:
+) -> list[list[StopNode]]:
     """Nodes of the start (n,) and of every stop; searches: for paths out of stations; interaction:
     for their configurations, where a station asks for that. Raises StageError for a stop that has
     none.
     """
-    layers = [[Node(ServiceLine(start[None]))]]
+    layers = [[StopNode(ServiceLine(start[None]))]]
     with context.journal.stage("configurations") as notes:
         for place in range(len(route)):
             progress("configurations", place, len(route), 0.0)

@@ -11,7 +11,7 @@ from ir_planner.checks import clearance_violation
 from ir_planner.program.chain import parts_of
 from ir_planner.program.movement_fronts import Ladder
 from ir_planner.program.movements import Failure, Movements
-from ir_planner.program.pauses import AUTO, Charge, Pause, pause_by_itself, planned_pause
+from ir_planner.program.pauses import AUTO, Charge, PlannedPause, pause_by_itself, planned_pause
 from ir_planner.program.request import ProgramRequest, Progress, StageError
 from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, HopPart, StationChain
 from ir_planner.program.steps import PlacedStep, Route, Scenes, signal_text
@@ -96,7 +96,7 @@ class Leg:
 
 
 Legs = dict[int, Leg]  # by the step they belong to
-MakePause = Callable[[Pause], PlannedMovement]
+MakePause = Callable[[PlannedPause], PlannedMovement]
 
 
 class Complete(Protocol):
@@ -189,7 +189,7 @@ def assembled(
         if step.dwell > 0.0 or (not moves and (handling or waiting)):
             late = not moves
             scene = scenes.after(placed) if moves else scenes.before(placed)
-            spent = Pause(here, step.dwell, step.power_mode, q, scene)
+            spent = PlannedPause(here, step.dwell, step.power_mode, q, scene)
             standing = charge.stood(pause(spent), spent)
             result.append(
                 replace(
@@ -308,11 +308,11 @@ class Choice:
         """Joules of a wait at the end, in the mode of least energy."""
         return self._pause(by_itself=False)(self._end(seconds)).report.energy
 
-    def _end(self, seconds: float) -> Pause:
+    def _end(self, seconds: float) -> PlannedPause:
         route = self.movements.route
         end = route.scenes.after(route.steps[-1])
         q = self.movements.layers[-1][self.chain.chosen[-1]].interaction
-        return Pause(route.name(len(route) - 1), seconds, AUTO, q, end)
+        return PlannedPause(route.name(len(route) - 1), seconds, AUTO, q, end)
 
     def _pause(self, by_itself: bool) -> MakePause:
         times = self.request.settings.transitions

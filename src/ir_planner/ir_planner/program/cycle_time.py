@@ -10,7 +10,7 @@ from ir_msgs_py.status import Status, StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.program.chain import cheapest_chain
 from ir_planner.program.choice import Choice, Found, Steps
-from ir_planner.program.movement_fronts import FASTEST, Point, SlowDown, TimeValues, slow_downs
+from ir_planner.program.movement_fronts import FASTEST, FrontPoint, SlowDown, TimeValues, slow_downs
 from ir_planner.program.movements import rates_of
 from ir_planner.program.request import Progress, StageError
 from ir_planner.program.station_graph import HopPart, StationChain
@@ -40,7 +40,7 @@ class Timed:
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class CycleTask:
     """seconds: for movements and the wait. waiting(seconds): joules of the wait. slower(movement,
     seconds): the same in more seconds, None where that isn't certified. spent: joules of a whole
     program, with carried charge.
@@ -52,7 +52,7 @@ class Task:
     spent: Callable[[Timed], float] = lambda timed: timed.energy
 
 
-def shared_out(values: TimeValues, task: Task) -> Timed | None:
+def shared_out(values: TimeValues, task: CycleTask) -> Timed | None:
     """The cheapest distribution of the time over movements and wait; None where it is too short."""
     fronts = values.fronts()
     chosen = {part: front[0] for part, front in fronts.items()}
@@ -76,7 +76,7 @@ def shared_out(values: TimeValues, task: Task) -> Timed | None:
     return min(whole, key=lambda timed: timed.energy, default=None)
 
 
-def _to_slow(point: Point) -> tuple[bool, float]:
+def _to_slow(point: FrontPoint) -> tuple[bool, float]:
     """The last to be slowed down is the longest movement, but none along a path at a tool's
     speed.
     """
@@ -84,7 +84,7 @@ def _to_slow(point: Point) -> tuple[bool, float]:
 
 
 def _filled(
-    chosen: dict[HopPart, Point], left: float, open_steps: list[SlowDown], task: Task
+    chosen: dict[HopPart, FrontPoint], left: float, open_steps: list[SlowDown], task: CycleTask
 ) -> list[Timed]:
     """Programs of these points: one that waits at the end, and one in which a part takes the time
     left.
@@ -305,7 +305,7 @@ def _cheapest_at(rung: int, choice: Choice, progress: Progress) -> Choice | None
     return choice.along(chain)
 
 
-def task_of(choice: Choice, seconds: float, standing: float) -> Task:
+def task_of(choice: Choice, seconds: float, standing: float) -> CycleTask:
     """What is to be shared out over a chain's movements and the wait; standing [s]: of pauses
     besides.
     """
@@ -313,7 +313,7 @@ def task_of(choice: Choice, seconds: float, standing: float) -> Task:
     def spent(timed: Timed) -> float:
         return TimedChoice(choice, timed, seconds + standing).energy
 
-    return Task(seconds, choice.waiting, _slower, spent)
+    return CycleTask(seconds, choice.waiting, _slower, spent)
 
 
 def _slower(movement: Movement, duration: float) -> Movement | None:

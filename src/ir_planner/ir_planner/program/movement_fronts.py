@@ -172,7 +172,7 @@ _POOR = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class FrontPoint:
     """A certified movement of a part, with its seconds and the drives' joules."""
 
     movement: Movement
@@ -180,10 +180,10 @@ class Point:
     joules: float
 
     @staticmethod
-    def of(movement: Movement) -> "Point":
+    def of(movement: Movement) -> "FrontPoint":
         """The point of a movement."""
         joules = cost_of(movement.consumption, Rates(1.0, 0.0))
-        return Point(movement, movement.trajectory.duration, joules)
+        return FrontPoint(movement, movement.trajectory.duration, joules)
 
     def cost(self, rates: Rates) -> float:
         """What it costs by other rates."""
@@ -206,7 +206,7 @@ class TimeValues:
     def __init__(self, ladder: Ladder, parts: Sequence[HopPart]) -> None:
         self.ladder = ladder
         self.parts = tuple(parts)
-        self._points: dict[HopPart, list[Point]] = {part: [] for part in self.parts}
+        self._points: dict[HopPart, list[FrontPoint]] = {part: [] for part in self.parts}
         self._seconds: dict[int, float] = {}
         self._exchanged: set[tuple[int, HopPart]] = set()
         self._own_seconds = self._take(ladder.own)
@@ -240,7 +240,7 @@ class TimeValues:
         planned = movements.plan(self.parts, self.ladder.improvement)
         for part, found in zip(self.parts, planned, strict=True):
             if not isinstance(found, Failure):
-                self._points[part].append(Point.of(found))
+                self._points[part].append(FrontPoint.of(found))
                 seconds += self._points[part][-1].seconds
             elif movements is self.ladder.own:
                 raise StageError(found.status)
@@ -286,12 +286,12 @@ class TimeValues:
                 best = min(points, key=lambda point: point.cost(rates))
                 if own is None or part.kind != ACROSS or (rung, part) in self._exchanged:
                     continue
-                if best.cost(rates) < (1.0 - _POOR) * Point.of(own).cost(rates):
+                if best.cost(rates) < (1.0 - _POOR) * FrontPoint.of(own).cost(rates):
                     poor[part] = best.movement
             self._exchanged.update((rung, part) for part in poor)
             if poor and not ladder.own.context.work.exhausted:
                 for part, found in ladder.from_others(rung, poor).items():
-                    self._points[part].append(Point.of(found))
+                    self._points[part].append(FrontPoint.of(found))
 
     def least(self, value: float) -> float:
         """What the chain costs at a value of a second [W], by all movements that are known."""
@@ -299,16 +299,16 @@ class TimeValues:
             min(p.joules + value * p.seconds for p in points) for points in self._points.values()
         )
 
-    def fronts(self) -> dict[HopPart, list[Point]]:
+    def fronts(self) -> dict[HopPart, list[FrontPoint]]:
         """The convex Pareto front of every part, fastest first."""
         return {part: convex_front(points) for part, points in self._points.items()}
 
 
-def convex_front(points: Sequence[Point]) -> list[Point]:
+def convex_front(points: Sequence[FrontPoint]) -> list[FrontPoint]:
     """Points below which no mixture of two others lies, fastest first: each slower one saves
     joules, and fewer per second than the one before.
     """
-    front: list[Point] = []
+    front: list[FrontPoint] = []
     for point in sorted(points, key=lambda p: (p.seconds, p.joules)):
         if front and point.joules >= front[-1].joules:
             continue
@@ -318,13 +318,13 @@ def convex_front(points: Sequence[Point]) -> list[Point]:
     return front
 
 
-def _saving(fast: Point, slow: Point) -> float:
+def _saving(fast: FrontPoint, slow: FrontPoint) -> float:
     """Joules saved per second between two points."""
     more = slow.seconds - fast.seconds
     return (fast.joules - slow.joules) / more if more > 0.0 else np.inf
 
 
-def slow_downs(fronts: dict[HopPart, list[Point]]) -> list[SlowDown]:
+def slow_downs(fronts: dict[HopPart, list[FrontPoint]]) -> list[SlowDown]:
     """All steps to slower points, those that save most joules per second first."""
     steps = [
         SlowDown(part, k + 1, b.seconds - a.seconds, a.joules - b.joules)

@@ -16,7 +16,7 @@ from ir_planner.errors import RequestError, TimingError
 from ir_planner.program.bounds import Rates
 from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, HopPart
 from ir_planner.program.steps import Route
-from ir_planner.program.stops import Node
+from ir_planner.program.stops import StopNode
 from ir_planner.regional import Searches, search_regional
 from ir_planner.request import Context, Goal, Journal, Work, parse_goal
 from ir_planner.service import timed_service
@@ -154,7 +154,7 @@ class Movements:
     def __init__(
         self,
         route: Route,
-        layers: list[list[Node]],
+        layers: list[list[StopNode]],
         context: Context,
         searches: Searches,
         near: WarmStarts | None = None,
@@ -251,7 +251,7 @@ class Movements:
         """The search that a regional movement is asked for by its step, else by the request."""
         return self.route.at(part.hop).step.planner or self.context.options.planner_id
 
-    def nodes(self, part: HopPart) -> tuple[Node, Node]:
+    def nodes(self, part: HopPart) -> tuple[StopNode, StopNode]:
         """The configurations of a part; the same twice where it is a service movement."""
         layers = self.layers
         first = (

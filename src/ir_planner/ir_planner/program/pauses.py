@@ -329,7 +329,7 @@ _EXACTLY = 1e-9  # s: a pause may be as long as its modes need
 
 
 @dataclass(frozen=True, eq=False)
-class Pause:
+class PlannedPause:
     """Where (a name, and q (n,)), how long [s], in which mode it was asked for (AUTO; "": not
     said), and what is held.
     """
@@ -341,7 +341,7 @@ class Pause:
     scene: PlanningScene
 
 
-def planned_pause(pause: Pause, times: TransitionTimes) -> PlannedMovement:
+def planned_pause(pause: PlannedPause, times: TransitionTimes) -> PlannedMovement:
     """In the mode that is asked for, where the pause is long enough for it, the sequence of least
     energy (AUTO), or on motors ("" where nothing is asked for); longer than the controller stands
     on motors: on brakes, which it would close anyway, so that they are open again in time.
@@ -356,7 +356,7 @@ def planned_pause(pause: Pause, times: TransitionTimes) -> PlannedMovement:
     return _spent(pause, mode, rests)
 
 
-def spent(pause: Pause, times: TransitionTimes) -> PlannedMovement:
+def spent(pause: PlannedPause, times: TransitionTimes) -> PlannedMovement:
     """In the modes that somebody asked for; where nobody did, as the controller spends it by
     itself.
     """
@@ -379,12 +379,12 @@ def switch_times(
     return (tuple(asked), wake_at) if asked and wake_at >= free - _EXACTLY else ((), seconds)
 
 
-def pause_by_itself(pause: Pause, times: TransitionTimes) -> PlannedMovement:
+def pause_by_itself(pause: PlannedPause, times: TransitionTimes) -> PlannedMovement:
     """As the controller spends it when nobody asks for a mode."""
     return _spent(pause, "", rests_at(pause.q, pause.scene, times))
 
 
-def _rested(pause: Pause, mode: str, rests: Rests) -> float:
+def _rested(pause: PlannedPause, mode: str, rests: Rests) -> float:
     """Energy [J] in a mode that is entered and left in time; inf: on motors, or the pause is too
     short.
     """
@@ -392,7 +392,7 @@ def _rested(pause: Pause, mode: str, rests: Rests) -> float:
     return rests.in_time(sequence, pause.seconds) if sequence else np.inf
 
 
-def _spent(pause: Pause, mode: str, rests: Rests) -> PlannedMovement:
+def _spent(pause: PlannedPause, mode: str, rests: Rests) -> PlannedMovement:
     energy = _rested(pause, mode, rests)
     if not np.isfinite(energy):  # on motors
         energy = rests.cost((), pause.seconds)[0]
@@ -447,7 +447,7 @@ class Charge:
         self.stored = energy.capacitor
         return energy
 
-    def stood(self, step: PlannedMovement, pause: Pause) -> PlannedMovement:
+    def stood(self, step: PlannedMovement, pause: PlannedPause) -> PlannedMovement:
         """The step of a pause, whose holding torque takes the charge first; what is still there
         when the drive bus is switched off need not be charged again until it has gone too.
         """

@@ -33,7 +33,7 @@ from ir_planner.program.savings import held_against_common, named
 from ir_planner.program.spreads import Spreads
 from ir_planner.program.station_graph import HopPart, Settled, StationGraph
 from ir_planner.program.steps import Route, Scenes, doors_advice, doors_text, placed_steps, steps_of
-from ir_planner.program.stops import Node, leaves_zone
+from ir_planner.program.stops import StopNode, leaves_zone
 from ir_planner.request import Context, Journal, Work, noted
 from ir_planner.scene import PlanningScene, scene_with
 from ir_planner.service import ExitPath, exit_searches, lines_free, service_lines
@@ -57,7 +57,7 @@ def logs_of(choice: Choice, steps: Sequence[PlannedMovement]) -> Iterator[Search
     movements = choice.movements
     seen = set[int]()
     for place, row in enumerate(choice.chain.chosen):
-        node: Node = movements.layers[place][row]
+        node: StopNode = movements.layers[place][row]
         found = node.line.exit
         if found is not None and id(found) not in seen:
             seen.add(id(found))
@@ -91,7 +91,9 @@ def _tool(q: FloatArray, scene: PlanningScene) -> FloatArray:
     return scene.chain.tcp_poses(np.ascontiguousarray(q))[:, :3, 3] if len(q) else np.zeros((0, 3))
 
 
-def _withdrawal_log(place: int, node: Node, found: ExitPath, movements: Movements) -> WithdrawalLog:
+def _withdrawal_log(
+    place: int, node: StopNode, found: ExitPath, movements: Movements
+) -> WithdrawalLog:
     """The withdrawal at a stop, along its points `found` but for whole turns."""
     scene = movements.route.arriving(place)
     station = scene.station(movements.route.name(place))

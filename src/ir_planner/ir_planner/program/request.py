@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ir_description import Cell, Finding, PowerData, ProgramStep
+from ir_description import Cell, CellFinding, PowerData, ProgramStep
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement, PlanningInfo, TrajectoryReport
@@ -110,14 +110,14 @@ class StageError(Exception):
 
 def unknown_searches(
     cell: Cell, steps: Sequence[ProgramStep], searches: Searches
-) -> Iterator[Finding]:
+) -> Iterator[CellFinding]:
     """Steps, and stations that they visit, with the name of a search that is not known or not
     installed.
     """
     for k, step in enumerate(steps, start=1):
         yield from _unknown(f"step {k}", step.planner, searches, "planner")
         if step.planner in searches and (how := not_installed(searches[step.planner])):
-            yield Finding("error", f"step {k}", f"planner {step.planner!r}: {how}")
+            yield CellFinding("error", f"step {k}", f"planner {step.planner!r}: {how}")
     visited = {step.target for step in steps}
     for station in cell.stations:
         if station.name in visited:
@@ -125,7 +125,7 @@ def unknown_searches(
                 station.name, station.search.withdrawal, EXIT_SEARCHES, "withdrawal"
             )
             if why := EXIT_SEARCHES.why_not(station.search.withdrawal):
-                yield Finding("error", station.name, f"withdrawal: {why}")
+                yield CellFinding("error", station.name, f"withdrawal: {why}")
 
 
 def check_searches(cell: Cell, steps: Sequence[ProgramStep], searches: Searches) -> None:
@@ -136,8 +136,8 @@ def check_searches(cell: Cell, steps: Sequence[ProgramStep], searches: Searches)
         )
 
 
-def _unknown(subject: str, value: str, known: Iterable[str], name: str) -> Iterator[Finding]:
+def _unknown(subject: str, value: str, known: Iterable[str], name: str) -> Iterator[CellFinding]:
     try:
         chosen(value, ("", *known), name)
     except RequestError as error:
-        yield Finding("error", subject, error.status.message)
+        yield CellFinding("error", subject, error.status.message)

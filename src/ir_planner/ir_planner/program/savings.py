@@ -234,7 +234,7 @@ _ENDED = "planning_time or max_iterations ended before the common program was co
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class SavingsComparison:
     """Savings, of which steps, what was compared in words, and the steps of the common program."""
 
     savings: ProgramSavings
@@ -250,7 +250,7 @@ def held_against_common(
     standing: float,
     spreads: Spreads,
     progress: Progress,
-) -> Comparison | str:
+) -> SavingsComparison | str:
     """The comparison of a program; own: its steps in a cycle time (0: free), of which `standing` s
     are pauses. Where there is none, the sentence why.
     """
@@ -273,7 +273,7 @@ def held_against_common(
                         "at its end"
                     )
                 savings = savings_of(waiting, own, _pauses(plain), common, spreads.of)
-                return Comparison(savings, own, words, waiting)
+                return SavingsComparison(savings, own, words, waiting)
             if context.work.exhausted:
                 notes.append("none")
                 return f"no savings: {_ENDED}"
@@ -283,7 +283,7 @@ def held_against_common(
             return f"no savings: {error}"
         words = f"both in the common program's {seconds:.2f} s"
         words += f", which can't keep {cycle_time:g} s" if cycle_time > 0.0 else ""
-        return Comparison(
+        return SavingsComparison(
             savings_of(plain, steps, _pauses(plain), common, spreads.of), steps, words, plain
         )
 

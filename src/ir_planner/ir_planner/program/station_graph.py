@@ -45,7 +45,7 @@ class Settled:
     proved: bool = True
 
 
-class Hop:
+class HopBounds:
     """Lower bounds of leaving (A,), across (A, B) and entering (B,), and which are exact. `cost`:
     with bounds that are measured, `proved`: without.
     """
@@ -146,7 +146,7 @@ class StationGraph:
     settled chain is known; must_end: while none is.
     """
 
-    hops: list[Hop]
+    hops: list[HopBounds]
     settle: Callable[[list[HopPart]], list[Settled]]
     tolerance: float = 0.0
     may_go_on: Callable[[], bool] = lambda: True

@@ -42,7 +42,7 @@ from ir_values.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
-class Node:
+class StopNode:
     """Where the arm works at a stop, and where nothing else may be near it (the outer end of its
     line).
 
@@ -180,7 +180,7 @@ def _exit_paths(
 _MOST_STOPS = 64
 
 
-def posture_nodes(name: str, arriving: Context) -> tuple[list[Node], Status]:
+def posture_nodes(name: str, arriving: Context) -> tuple[list[StopNode], Status]:
     """The one configuration of a posture, or none with the pair that is too near."""
     scene = arriving.scene
     margin = arriving.safety_distance
@@ -190,7 +190,7 @@ def posture_nodes(name: str, arriving: Context) -> tuple[list[Node], Status]:
         return [], Status(
             StatusCode.GOAL_IN_COLLISION, too_near(q, space, f"posture {name}", margin)
         )
-    return [Node(ServiceLine(q[None]))], Status.success()
+    return [StopNode(ServiceLine(q[None]))], Status.success()
 
 
 def station_nodes(
@@ -199,7 +199,7 @@ def station_nodes(
     near: FloatArray,
     searches: Mapping[str, ExitSearch],
     interaction: InteractionSettings = INTERACTION,
-) -> tuple[list[Node], Status]:
+) -> tuple[list[StopNode], Status]:
     """Configurations at the context's station, cheapest from `near` (n,) first, with a free path in
     and out; or none and why.
 
@@ -232,7 +232,7 @@ def station_nodes(
     journal.rejected.update(+rejected)
     if not lines:
         return [], _no_exit(station, len(found.q), len(straight), +rejected)
-    return [Node(line) for line in lines], Status.success()
+    return [StopNode(line) for line in lines], Status.success()
 
 
 def _no_exit(
@@ -293,7 +293,7 @@ def _configurations(
 _MOST_PATH_STOPS = 64
 
 
-def path_nodes(arriving: Context, leaving: PlanningScene) -> tuple[list[Node], Status]:
+def path_nodes(arriving: Context, leaving: PlanningScene) -> tuple[list[StopNode], Status]:
     """Certified movements along the context's path, each from and to where nothing may be touched;
     or none and why.
     """
@@ -309,7 +309,7 @@ def path_nodes(arriving: Context, leaving: PlanningScene) -> tuple[list[Node], S
     except RequestError as error:  # a path that draws nothing
         raise RequestError(error.code, f"path {name}: {error}") from error
     return [
-        Node(ServiceLine(one.points[::-1], straight=False), one.movement) for one in found
+        StopNode(ServiceLine(one.points[::-1], straight=False), one.movement) for one in found
     ], Status.success()
 
 

@@ -197,7 +197,7 @@ class Ball:
 
 
 @dataclass(frozen=True, eq=False)
-class Enclosure:
+class EndEnclosure:
     """end: "start" or "goal", that which is in the smaller part of the space; the capsule that
     can't leave it, the body at the widest passage out of it, the clearance there and what the pair
     must keep [m].
@@ -223,7 +223,7 @@ class Enclosure:
         )
 
 
-def enclosure(ends: Ends, space: FreeSpace) -> Enclosure | None:
+def enclosure(ends: Ends, space: FreeSpace) -> EndEnclosure | None:
     """What proves that no path leads from the start to any of the goals; None: nothing is
     proved.
     """
@@ -255,7 +255,9 @@ def enclosure(ends: Ends, space: FreeSpace) -> Enclosure | None:
         end, inside = ("goal", goal) if goal.sum() <= start.sum() else ("start", start)
         number = field.beside_widest_exit(inside)
         clearance = float(lengths[number]) + low - ball.radius
-        return Enclosure(end, ball.capsule, bodies[number].name, clearance, float(lengths[number]))
+        return EndEnclosure(
+            end, ball.capsule, bodies[number].name, clearance, float(lengths[number])
+        )
     return None
 
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ir_description import LIMIT_TOLERANCE, OUTSIDE_MAX, Cell
 from ir_description.poses import rotation_from_abc
 from ir_msgs_py.status import StatusCode
-from ir_msgs_py.trajectory import JointTrajectory, Samples
+from ir_msgs_py.trajectory import JointTrajectory, MotionSamples
 from ir_planner.errors import RequestError, unfit, unknown_name
 from ir_values.argument_types import typed, typed_methods
 from ir_values.arrays import FloatArray
@@ -227,7 +227,7 @@ def motion_of(
     return motion if motion.any() else None
 
 
-def motion_on(trajectory: JointTrajectory, at: float, cell: Cell) -> Samples:
+def motion_on(trajectory: JointTrajectory, at: float, cell: Cell) -> MotionSamples:
     """Motion (1, n) at the time `at` [s], to a nanosecond, of a trajectory in the robot's joint
     order. Raises RequestError where it lasts not as long.
     """

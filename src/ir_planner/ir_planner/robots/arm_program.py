@@ -13,13 +13,13 @@ from ir_msgs_py.plc import Signal
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import clearance_violation
-from ir_planner.cycle import ArmSchedule, ArmWork, Lag, Wait
+from ir_planner.cycle import ArmSchedule, ArmWork, Lag, ModeWait
 from ir_planner.errors import RequestError
 from ir_planner.flexible import RUNGS, MovementColumn, slowed_down, wait_modes
 from ir_planner.program import (
     MOTORS,
     Charge,
-    Pause,
+    PlannedPause,
     ProgramRequest,
     StageError,
     TimeValues,
@@ -39,7 +39,7 @@ _SLOWER = tuple(1.1**k for k in range(1, 25))  # times the slowest, up to ten ti
 
 
 @dataclass(frozen=True, eq=False)
-class Stop:
+class ArmStop:
     """Where a robot stands before a movement: q (n,), what it carries from then on (scene), and the
     pauses of the program there.
     """
@@ -65,7 +65,7 @@ class ArmProgram:
     request: ProgramRequest
     steps: tuple[PlannedMovement, ...]
     columns: tuple[MovementColumn, ...]
-    stops: tuple[Stop, ...]
+    stops: tuple[ArmStop, ...]
 
     @property
     def cell(self) -> Cell:
@@ -144,13 +144,13 @@ class ArmProgram:
     def lead(self, seconds: float) -> PlannedMovement:
         """Standing on motors before the program begins."""
         stop = self.stops[0]
-        asked = Pause(stop.name, seconds, MOTORS, stop.q, stop.scene)
+        asked = PlannedPause(stop.name, seconds, MOTORS, stop.q, stop.scene)
         return spent(asked, self.request.settings.transitions)
 
     def driven(
         self,
         movements: Sequence[Movement],
-        waits: Sequence[Sequence[Wait]],
+        waits: Sequence[Sequence[ModeWait]],
         signals: Sequence[tuple[tuple[str, ...], tuple[str, ...]]],
     ) -> tuple[PlannedMovement, ...]:
         """The steps of a cycle from the stop before the first movement on; signals: which each
@@ -162,10 +162,12 @@ class ArmProgram:
         for k, (step, movement) in enumerate(zip(self.steps, movements, strict=True)):
             stop = self.stops[k]
             for pause in stop.pauses:
-                asked = Pause(stop.name, pause.duration, pause.power_mode, stop.q, stop.scene)
+                asked = PlannedPause(
+                    stop.name, pause.duration, pause.power_mode, stop.q, stop.scene
+                )
                 steps.append(charge.stood(spent(asked, times), asked))
             for wait in waits[k]:
-                asked = Pause(stop.name, wait.seconds, wait.mode, stop.q, stop.scene)
+                asked = PlannedPause(stop.name, wait.seconds, wait.mode, stop.q, stop.scene)
                 steps.append(charge.stood(spent(asked, times), asked))
             trajectory = movement.trajectory
             moving = replace(
@@ -375,7 +377,7 @@ def _arm(
     pauses = [[*before[-1], *before[0]], *before[1:-1]]
     names = [moving[-1].to_station, *(step.to_station for step in moving[:-1])]
     stops = tuple(
-        Stop(name, column.movements[0].trajectory.positions[0], _scene(column), tuple(own))
+        ArmStop(name, column.movements[0].trajectory.positions[0], _scene(column), tuple(own))
         for name, column, own in zip(names, columns, pauses, strict=True)
     )
     return ArmProgram(robot, request, tuple(moving), tuple(columns), stops)

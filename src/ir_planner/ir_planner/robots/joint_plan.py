@@ -16,9 +16,9 @@ from ir_msgs_py.status import Status, StatusCode
 from ir_planner.cycle import (
     ArmSchedule,
     ArmWork,
+    ExclusiveZone,
     JointCycle,
     WaitMode,
-    Zone,
     ZoneStretch,
     cheapest_joint,
     shortest_joint,
@@ -193,7 +193,7 @@ class _Joint:
     def _both(self, pair: tuple[int, int]) -> tuple[ArmProgram, ArmProgram]:
         return self.arms[pair[0]], self.arms[pair[1]]
 
-    def _take(self, chosen: Chosen, zones: Sequence[Zone]) -> bool:
+    def _take(self, chosen: Chosen, zones: Sequence[ExclusiveZone]) -> bool:
         """Add what could meet with these movements and isn't ordered by a zone; whether anything
         was.
         """
@@ -208,7 +208,7 @@ class _Joint:
                     new = True
         return new
 
-    def _zones(self) -> tuple[Zone, ...]:
+    def _zones(self) -> tuple[ExclusiveZone, ...]:
         """The zones of all pairs. Raises RequestError for one that no cycle passes."""
         zones = []
         for pair in self._pairs:
@@ -217,7 +217,7 @@ class _Joint:
             zones += [self._passable(zone) for zone in found]
         return tuple(zones)
 
-    def _passable(self, zone: Zone) -> Zone:
+    def _passable(self, zone: ExclusiveZone) -> ExclusiveZone:
         """The zone; where a program begins within its stretch, the other robot passes first."""
         first = set(zone.first)
         for own, other in ((zone.one, zone.other), (zone.other, zone.one)):
@@ -277,7 +277,7 @@ class _Joint:
             )
 
     def _answer(
-        self, zones: tuple[Zone, ...], chosen: Chosen, first: JointCycle, fastest: float
+        self, zones: tuple[ExclusiveZone, ...], chosen: Chosen, first: JointCycle, fastest: float
     ) -> RobotsPlan:
         fixed = [arm.work(own) for arm, own in zip(self.arms, chosen, strict=True)]
         cycle = cheapest_joint(fixed, zones, first.period + _ROUNDING)
@@ -317,7 +317,7 @@ class _Joint:
         waited = sum(wait.seconds for wait in schedule.waits[0])
         return schedule.begin[0] - waited - self.arms[robot].stops[0].seconds + 0.0
 
-    def _full_speed(self, zones: tuple[Zone, ...], period: float) -> float:
+    def _full_speed(self, zones: tuple[ExclusiveZone, ...], period: float) -> float:
         """Joules with all movements as fast as they can, and motors on in every wait."""
         works = [
             _on_motors(arm.work([column.movements[0] for column in arm.columns]))
@@ -334,7 +334,7 @@ class _Joint:
         return list(itertools.islice(free, count))
 
     def _signals(
-        self, zones: Sequence[Zone], names: Sequence[str], turns: Sequence[int]
+        self, zones: Sequence[ExclusiveZone], names: Sequence[str], turns: Sequence[int]
     ) -> list[list[tuple[tuple[str, ...], tuple[str, ...]]]]:
         """Of each movement of each robot, the signals that it waits for and that it sets."""
         waits: list[list[list[str]]] = [[[] for _ in arm.steps] for arm in self.arms]
@@ -354,7 +354,9 @@ class _Joint:
             for own_waits, own_sets in zip(waits, sets, strict=True)
         ]
 
-    def _shared(self, n: int, zone: Zone, cycle: JointCycle, signal: tuple[str, int]) -> SharedZone:
+    def _shared(
+        self, n: int, zone: ExclusiveZone, cycle: JointCycle, signal: tuple[str, int]
+    ) -> SharedZone:
         spans = [
             _passed(stretch, cycle, len(self.arms[stretch.robot].steps))
             for stretch in (zone.one, zone.other)
@@ -371,7 +373,7 @@ class _Joint:
         )
 
 
-def _turn(zone: Zone, later: bool, arms: Arms) -> int:
+def _turn(zone: ExclusiveZone, later: bool, arms: Arms) -> int:
     """Whose turn it is when the programs begin, 0 or 1: of who begins within, else who is first."""
     begun = [
         stretch.first + stretch.count > len(arms[stretch.robot].steps)

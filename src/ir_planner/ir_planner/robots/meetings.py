@@ -16,7 +16,7 @@ from ir_description import Equipment, RobotCells
 from ir_kernels import FREE
 from ir_kernels.swept import SweptArm, meeting
 from ir_msgs_py.status import StatusCode
-from ir_planner.cycle import Zone, ZoneStretch
+from ir_planner.cycle import ExclusiveZone, ZoneStretch
 from ir_planner.errors import RequestError
 from ir_planner.robots.arm_program import ArmProgram
 from ir_planner.scene import PROOF_TOLERANCE
@@ -110,7 +110,9 @@ def _with_neighbours(cell: Pair, arms: tuple[ArmProgram, ArmProgram]) -> Iterato
             yield a, b
 
 
-def ordered(cell: Pair, zones: Sequence[Zone], arms: tuple[ArmProgram, ArmProgram]) -> bool:
+def ordered(
+    cell: Pair, zones: Sequence[ExclusiveZone], arms: tuple[ArmProgram, ArmProgram]
+) -> bool:
     """Whether a zone keeps two activities apart."""
     return any(
         all(

@@ -115,7 +115,7 @@ class IndirectMeter:
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredEnergies:
     """A movement of `seconds` [s] by each measurement [J]: the meter, positions, torques, and
     positions with Pinocchio's torques; NaN where one is not available.
     """
@@ -140,7 +140,7 @@ class Agreement:
     spread: standard deviation of the relative difference over movements.
     """
 
-    movements: tuple[Measured, ...]
+    movements: tuple[MeasuredEnergies, ...]
     difference: Mean
     spread: float
 
@@ -167,7 +167,7 @@ class Agreement:
 def agreement(analysis: Analysis) -> Agreement:
     """Both measurements of all movements of a recording that ended."""
     rows = tuple(
-        Measured(
+        MeasuredEnergies(
             result.step.label,
             result.seconds,
             result.energy,
@@ -181,7 +181,7 @@ def agreement(analysis: Analysis) -> Agreement:
     return agreement_of(rows)
 
 
-def agreement_of(rows: tuple[Measured, ...]) -> Agreement:
+def agreement_of(rows: tuple[MeasuredEnergies, ...]) -> Agreement:
     """What both measurements of some movements say together."""
     both = [row for row in rows if math.isfinite(row.difference)]
     differences = np.array([row.difference for row in both])

@@ -1,7 +1,7 @@
 """Power parameters fitted to a meter or to the motors, and what the data say of each."""
 
 from ir_recorder.fit.channels import open_prior
-from ir_recorder.fit.data import BY, FitData, Source, fit_data, source_cell
+from ir_recorder.fit.data import BY, DataSource, FitData, fit_data, source_cell
 from ir_recorder.fit.doubts import doubts, fit_sources, result
 from ir_recorder.fit.estimate import Estimate, Fit, FittedMovement, fit
 from ir_recorder.fit.left_out import (
@@ -16,12 +16,12 @@ from ir_recorder.fit.presentation import left_out_rows, parameter_rows, sentence
 
 __all__ = [
     "BY",
+    "DataSource",
     "Estimate",
     "Fit",
     "FitData",
     "FittedMovement",
     "LeftOut",
-    "Source",
     "doubts",
     "fit",
     "fit_data",

@@ -32,7 +32,7 @@ def by_window(values: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class FittedRun:
     """One recording: its name, its samples, and these prepared for the model; first: the number of
     its first window among those of all recordings.
     """
@@ -49,12 +49,12 @@ class Run:
 
 def runs_of(
     recordings: Sequence[Samples], names: Sequence[str], model: PowerModel
-) -> tuple[Run, ...]:
+) -> tuple[FittedRun, ...]:
     """The recordings with their places one behind another."""
-    runs: list[Run] = []
+    runs: list[FittedRun] = []
     first = 0
     for samples, name in zip(recordings, names, strict=True):
-        runs.append(Run(name, samples, model.prepare(samples), first))
+        runs.append(FittedRun(name, samples, model.prepare(samples), first))
         first += len(samples) // WINDOW
     return tuple(runs)
 
@@ -73,10 +73,10 @@ class Channel(Protocol):
         """Rows (R,) for parameters x (P + E,), and their slopes (R, P + E)."""
 
 
-class Meter:
+class MeterChannel:
     """Watts at the mains; groups: at rest, and in motion."""
 
-    def __init__(self, runs: Sequence[Run], model: PowerModel, extra: int) -> None:
+    def __init__(self, runs: Sequence[FittedRun], model: PowerModel, extra: int) -> None:
         self._runs = runs
         self._model = model
         self._extra = extra
@@ -131,7 +131,7 @@ class Motors:
     per axis, units of what the controller says per Nm: 1 for torques.
     """
 
-    def __init__(self, runs: Sequence[Run], model: PowerModel) -> None:
+    def __init__(self, runs: Sequence[FittedRun], model: PowerModel) -> None:
         self._runs = runs
         self._model = model
         self.n = len(model.layout.joints)

@@ -220,7 +220,7 @@ class FitData:
 
 
 @dataclass(frozen=True)
-class Source:
+class DataSource:
     """A file of the robot's motion; a file of the meter (None: the same), with the mapping of each;
     a cell for what no file says of it, and what is held all the time ("" where the recording
     knows).
@@ -238,13 +238,13 @@ class Source:
         """The recording that the motion is from, read once; None for other files."""
         return read_recording(self.motion) if self.motion.suffix.lower() == ".mcap" else None
 
-    def on_clock(self, seconds: float) -> Source:
+    def on_clock(self, seconds: float) -> DataSource:
         """The same with so much added to the meter's clock."""
         mapping = self.meter_mapping or TraceMapping()
         return replace(self, meter_mapping=replace(mapping, clock_offset=seconds))
 
 
-def source_cell(source: Source) -> Cell:
+def source_cell(source: DataSource) -> Cell:
     """The cell that is given, else the one that the recording carries; RecorderError where there
     is none.
     """
@@ -255,11 +255,13 @@ BY = ("meter", "motors", "both")
 """What a fit explains: watts, torques or currents of the motors, or both."""
 
 
-def fit_data(sources: Source | Sequence[Source], prior: PowerParameters, by: str = "") -> FitData:
+def fit_data(
+    sources: DataSource | Sequence[DataSource], prior: PowerParameters, by: str = ""
+) -> FitData:
     """Read all sources and lay each on a grid; ReadError or RecorderError as a sentence. by: one of
     BY; "": the meter, and the motors where there is no meter.
     """
-    given = (sources,) if isinstance(sources, Source) else tuple(sources)
+    given = (sources,) if isinstance(sources, DataSource) else tuple(sources)
     cells = [source_cell(each) for each in given]
     if strange := [cell.robot.name for cell in cells if cell.robot.name != prior.robot]:
         raise RecorderError(f"one fit is of one robot, there is {strange[0]} beside {prior.robot}")
@@ -283,7 +285,7 @@ def fit_data(sources: Source | Sequence[Source], prior: PowerParameters, by: str
 
 
 def _run(
-    source: Source, prior: PowerParameters, model: PowerModel, by: str
+    source: DataSource, prior: PowerParameters, model: PowerModel, by: str
 ) -> tuple[Samples, list[str], float]:
     """A source on one grid, sentences on how it was laid there, and what was added to the clock of
     its meter so that its power agrees with the predicted one [s]; else NaN.

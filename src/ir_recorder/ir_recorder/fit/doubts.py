@@ -12,8 +12,8 @@ import numpy as np
 
 from ir_description import AXIS_UNITS, PowerParameters
 from ir_recorder.errors import RecorderError
-from ir_recorder.fit.channels import Run, by_window
-from ir_recorder.fit.data import FitData, Source, fit_data
+from ir_recorder.fit.channels import FittedRun, by_window
+from ir_recorder.fit.data import DataSource, FitData, fit_data
 from ir_recorder.fit.estimate import Estimate, Fit
 from ir_recorder.measure import Samples
 from ir_values.arrays import FloatArray, IntArray
@@ -42,7 +42,7 @@ def result(estimate: Estimate, name: str) -> Fit:
 
 
 def fit_sources(
-    sources: Sequence[Source], prior: PowerParameters, by: str, name: str
+    sources: Sequence[DataSource], prior: PowerParameters, by: str, name: str
 ) -> tuple[FitData, Estimate, Fit]:
     """A fit of files. Where a meter's clock was found by the power that the prior predicts, which
     is some ms off as that power is, it is found with the parameters. Errors as in `fit_data` and
@@ -108,7 +108,7 @@ def doubts(estimate: Estimate, found: Fit | None = None) -> Doubts:
 
 
 def _of_power(
-    estimate: Estimate, run: Run, predicted: FloatArray, sheet: FloatArray
+    estimate: Estimate, run: FittedRun, predicted: FloatArray, sheet: FloatArray
 ) -> Iterator[str]:
     measured = np.where(run.samples.known, run.samples.watts, np.nan)
     moving = run.samples.moving & np.isfinite(measured)

@@ -16,9 +16,9 @@ from ir_recorder.fit.channels import (
     FRICTION,
     WINDOW,
     Channel,
-    Meter,
+    FittedRun,
+    MeterChannel,
     Motors,
-    Run,
     by_window,
     open_prior,
     runs_of,
@@ -269,7 +269,7 @@ class Estimate:
         self.runs = runs_of(recordings, names, model)
         self.motors = Motors(self.runs, model) if motors else None
         extra = 0 if self.motors is None else 2 * self.motors.n
-        meter = Meter(self.runs, model, extra)
+        meter = MeterChannel(self.runs, model, extra)
         self.meter = meter if len(meter.window) else None
         channels = (self.meter, self.motors)
         self._channels: list[Channel] = [each for each in channels if each is not None]
@@ -645,7 +645,7 @@ class Estimate:
 
     def _stretches(
         self,
-        run: Run,
+        run: FittedRun,
         span: tuple[int, int],
         missing: FloatArray,
         slopes: FloatArray,

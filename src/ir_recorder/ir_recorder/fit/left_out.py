@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_recorder.fit.channels import WINDOW, Motors, Run
+from ir_recorder.fit.channels import WINDOW, FittedRun, Motors
 from ir_recorder.fit.estimate import Estimate
 from ir_recorder.measure import movements
 from ir_values.arrays import BoolArray, FloatArray, IntArray
@@ -97,7 +97,7 @@ def _parts(estimate: Estimate) -> list[_Part]:
     return [_Part(f"part {k} of {QUARTERS}", share) for k, share in enumerate(shares, 1)]
 
 
-def _end(run: Run) -> int:
+def _end(run: FittedRun) -> int:
     return run.first + len(run.samples) // WINDOW
 
 
@@ -158,7 +158,7 @@ def _metered(estimate: Estimate, parts: Sequence[_Part]) -> tuple[LeftOut, ...]:
     return tuple(found)
 
 
-def _rows(run: Run, part: _Part, *, inside: bool) -> IntArray:
+def _rows(run: FittedRun, part: _Part, *, inside: bool) -> IntArray:
     """Samples of a recording that have watts and belong to a part, or (not inside) do not."""
     window = run.first + np.arange(len(run.samples)) // WINDOW
     usable = run.samples.known & np.isfinite(run.samples.watts)
@@ -199,7 +199,7 @@ def _energies(
     return errors, covered if covariance is not None else None
 
 
-def _features(estimate: Estimate, run: Run) -> FloatArray:
+def _features(estimate: Estimate, run: FittedRun) -> FloatArray:
     """What a regression of the watts takes (M, K): per axis torque of the bodies times speed, its
     square, size and square of the speed, acceleration times speed; and a level for each mode.
     """

@@ -31,7 +31,7 @@ MOST_STEPS = 2_000
 
 
 @dataclass(frozen=True, eq=False)
-class Heard:
+class ReceivedCell:
     """What was heard last.
 
     cell: the text of its file; states: machine and state, "shut>open" while it
@@ -67,7 +67,7 @@ class CellView:
         self._model: tuple[object, CollisionModel] | None = None
         self._path: tuple[JointTrajectory | None, str] = (None, "")
 
-    def look(self, heard: Heard) -> dict[str, Json]:
+    def look(self, heard: ReceivedCell) -> dict[str, Json]:
         """What has to be shown: name, problem, number of the scene, places of parts, nearest pair,
         path.
         """
@@ -168,7 +168,7 @@ class CellView:
             if at and cell is not None
         }
 
-    def _near(self, heard: Heard) -> Json:
+    def _near(self, heard: ReceivedCell) -> Json:
         """Distance [m], the two points and the names of the nearest pair that isn't allowed to
         touch, with the load of the movement that runs; None in a pause. Both as in a report: what
         stands at a station may touch it, and the word of a new load may come late.

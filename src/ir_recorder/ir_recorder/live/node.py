@@ -39,8 +39,8 @@ from ir_msgs_py.ros.diagnostics import OK, Condition, Diagnostics
 from ir_msgs_py.ros.topics import PolledTopic
 from ir_recorder.analysis.checks import Tolerances
 from ir_recorder.analysis.steps import STARTED, step_label
-from ir_recorder.live.cell_view import CellView, Heard
-from ir_recorder.live.server import Command, Commands, LiveServer
+from ir_recorder.live.cell_view import CellView, ReceivedCell
+from ir_recorder.live.server import Commands, LevelCommand, LiveServer
 from ir_recorder.live.stream import Stream, levels, machines, number, power_values, states_of, text
 from ir_recorder.reading.messages import contact_sentence, movement_from
 from ir_recorder.report.series import Json
@@ -85,7 +85,7 @@ class LiveNode(Node):
         self._looking: Future[dict[str, Json]] | None = None
         self._looked = -math.inf
         self._powered = -math.inf
-        self._heard = Heard()
+        self._heard = ReceivedCell()
         self._ended = list[PlannedMovement | None]()
         self._driven = ""
         self._contacts = 0
@@ -250,7 +250,7 @@ class LiveNode(Node):
 
         future.add_done_callback(take)
 
-    def _ask(self, command: Command) -> None:
+    def _ask(self, command: LevelCommand) -> None:
         """Hands a level to the driver, and its answer to who asked."""
         if not self._set_bit.service_is_ready():
             command.answer(False, "no driver is heard")

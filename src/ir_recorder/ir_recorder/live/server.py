@@ -150,14 +150,14 @@ MOST_BODY = 1_000  # bytes of a request
 _CROWDED = "too many browsers look at this cell; close one"
 
 
-class Answer(NamedTuple):
+class ButtonAnswer(NamedTuple):
     """What came of a button: whether it was done, and a sentence."""
 
     done: bool
     sentence: str
 
 
-Press = Callable[[str, Any], Answer]
+Press = Callable[[str, Any], ButtonAnswer]
 """Asks for what a control says, a level of a PLC bit, and waits for the answer; called from a
 connection's thread.
 """
@@ -423,24 +423,24 @@ MOST_WAITING = 16
 _STOP = "emergency_stop"
 
 
-_UNANSWERED = Answer(False, f"the driver has not answered within {PATIENCE:g} s")
+_UNANSWERED = ButtonAnswer(False, f"the driver has not answered within {PATIENCE:g} s")
 
 
 @dataclass(eq=False)
-class Command:
+class LevelCommand:
     """A level asked for; `answer` lets the browser's thread go on, once."""
 
     name: str
     value: bool
     _done: threading.Event = field(default_factory=threading.Event)
-    _answer: Answer = _UNANSWERED
+    _answer: ButtonAnswer = _UNANSWERED
 
     def answer(self, done: bool, sentence: str) -> None:
         """Says what came of it."""
-        self._answer = Answer(done, sentence)
+        self._answer = ButtonAnswer(done, sentence)
         self._done.set()
 
-    def wait(self) -> Answer:
+    def wait(self) -> ButtonAnswer:
         """The answer, or that there was none in time."""
         self._done.wait(PATIENCE)
         return self._answer
@@ -454,15 +454,17 @@ class Commands:
     """
 
     def __init__(self) -> None:
-        self._queue: queue.Queue[Command] = queue.Queue(MOST_WAITING)
-        self._stops: queue.Queue[Command] = queue.Queue()
+        self._queue: queue.Queue[LevelCommand] = queue.Queue(MOST_WAITING)
+        self._stops: queue.Queue[LevelCommand] = queue.Queue()
         self._order = threading.Lock()  # of presses and of what waits when they come
 
-    def press(self, name: str, value: bool) -> Answer:
+    def press(self, name: str, value: bool) -> ButtonAnswer:
         """Asks and waits; refuses what is no bit, and what comes faster than it is answered."""
         if name not in BITS:
-            return Answer(False, f"{name[:60]!r} is no bit of the PLC: known are {', '.join(BITS)}")
-        command = Command(name, value)
+            return ButtonAnswer(
+                False, f"{name[:60]!r} is no bit of the PLC: known are {', '.join(BITS)}"
+            )
+        command = LevelCommand(name, value)
         stop = name == _STOP and value
         try:
             with self._order:
@@ -470,17 +472,17 @@ class Commands:
                     before.answer(False, "the emergency stop was pressed after it: ask again")
                 (self._stops if stop else self._queue).put_nowait(command)
         except queue.Full:
-            return Answer(False, f"{MOST_WAITING} requests wait already")
+            return ButtonAnswer(False, f"{MOST_WAITING} requests wait already")
         return command.wait()
 
-    def take(self) -> Iterator[Command]:
+    def take(self) -> Iterator[LevelCommand]:
         """What has been asked since the last time."""
         with self._order:
             taken = [*_waiting(self._stops), *_waiting(self._queue)]
         yield from taken
 
 
-def _waiting(commands: queue.Queue[Command]) -> Iterator[Command]:
+def _waiting(commands: queue.Queue[LevelCommand]) -> Iterator[LevelCommand]:
     """Those that wait, taken out."""
     with suppress(queue.Empty):
         while True:

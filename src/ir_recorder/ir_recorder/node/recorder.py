@@ -34,7 +34,7 @@ from ir_recorder.format.contents import Split
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.format.schemas import SchemaLibrary
 from ir_recorder.node.requests import CellRequest, ParameterRequests
-from ir_recorder.node.subscriptions import Listener, is_own
+from ir_recorder.node.subscriptions import TopicListener, is_own
 from ir_recorder.recording.session import (
     CellFiles,
     RecordingSession,
@@ -211,7 +211,7 @@ class RecorderNode(Node):
         self._asked: _Asked | None = None
         self._schemas = SchemaLibrary()
         self._selection = TopicSelection()
-        self._listener = Listener(self, self._settings.depth)
+        self._listener = TopicListener(self, self._settings.depth)
         self._passed_over: set[str] = set()
         self._failure = ""
         self._cell = CellRequest(self, self._attach)

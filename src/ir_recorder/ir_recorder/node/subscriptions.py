@@ -68,7 +68,7 @@ def is_own(arrival: Arrival, namespace: str) -> bool:
         return False
 
 
-class Listener:
+class TopicListener:
     """Subscriptions of a node by topic; `lost` counts messages of single publishers that never
     arrived.
     """

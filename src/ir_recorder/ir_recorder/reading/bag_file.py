@@ -35,7 +35,7 @@ def read_bag_file(
         raise ReadError(str(error)) from error
     except OSError as error:
         raise ReadError(f"{path} can't be read: {error.strerror}") from error
-    reader = _Reader(path, ChunkReader(limits or ReadLimits()))
+    reader = _BagReader(path, ChunkReader(limits or ReadLimits()))
     try:
         source = f"{path.resolve().as_uri()}?mode=ro"
         with closing(sqlite3.connect(source, uri=True)) as bag:
@@ -48,7 +48,7 @@ def read_bag_file(
     return RawRecording(path, channels, (), (), tuple(map(one_line, reader.problems)))
 
 
-class _Reader:
+class _BagReader:
     def __init__(self, path: Path, memory: ChunkReader) -> None:
         self._path = path
         self._memory = memory

@@ -124,7 +124,7 @@ def read_recording(
     ReadError when the file is no recording, or holds no cell of that namespace.
     """
     read = read_bag_file if Path(path).suffix.lower() == ".db3" else read_raw
-    return _Reader(read(Path(path), roots, limits), namespace).recording()
+    return _SeriesReader(read(Path(path), roots, limits), namespace).recording()
 
 
 def _taken(channel: RawChannel, rows: Sequence[int]) -> tuple[Columns, RawChannel]:
@@ -134,7 +134,7 @@ def _taken(channel: RawChannel, rows: Sequence[int]) -> tuple[Columns, RawChanne
     return Columns(messages, channel.type, channel.schema_text), channel
 
 
-class _Reader:
+class _SeriesReader:
     def __init__(self, raw: RawRecording, namespace: str | None) -> None:
         self._raw = raw
         self._problems = list(raw.problems)

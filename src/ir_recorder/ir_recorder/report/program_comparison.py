@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ir_description import Cell
-from ir_msgs_py.savings import BeforeAfter, Change, Side
+from ir_msgs_py.savings import BeforeAfter, Side, StepChange
 from ir_recorder.analysis.production import (
     DRIVES_ONLY,
     OPEN,
@@ -219,7 +219,7 @@ def change_table(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     return none + (table(heads, rows, "Changes") if rows else "")
 
 
-def _change(k: int, change: Change) -> tuple[str, ...]:
+def _change(k: int, change: StepChange) -> tuple[str, ...]:
     saving = change.saving
     between = span_of(saving.saved_low, saving.saved_high, watt_hours)
     return (
@@ -229,7 +229,7 @@ def _change(k: int, change: Change) -> tuple[str, ...]:
     )
 
 
-def _long(change: Change) -> str:
+def _long(change: StepChange) -> str:
     """How long a pause is, which tells it from others at its place."""
     return f", pause of {seconds(change.seconds[0])}" if change.work == MODE else ""
 

@@ -71,7 +71,7 @@ def read_csv(
     """
     with _lines(path) as file:
         try:
-            return _Reader(path, file, wanted, mapping, _cut(file), joint_names).trace()
+            return _TableReader(path, file, wanted, mapping, _cut(file), joint_names).trace()
         except csv.Error as error:
             raise RecorderError(f"{path}: {error}") from error
 
@@ -92,7 +92,7 @@ def _cut(file: TextIO) -> bool:
     return not end.endswith((b"\r", b"\n"))
 
 
-class _Reader:
+class _TableReader:
     """cut: the last line has no end; one that lacks values is left out then."""
 
     def __init__(

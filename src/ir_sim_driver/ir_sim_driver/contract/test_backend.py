@@ -11,7 +11,7 @@ from ir_description import Cell, Load, load_cell
 from ir_kernels.dynamics import DynamicsModel
 from ir_sim_driver.controller import SimulationSettings
 from ir_sim_driver.errors import SettingsError
-from ir_sim_driver.plant import BACKENDS, Backend, Work, make_backend
+from ir_sim_driver.plant import BACKENDS, Backend, MotorWork, make_backend
 
 SETTINGS = SimulationSettings()
 DT = SETTINGS.dt
@@ -129,7 +129,7 @@ def test_work_is_handed_over_once_with_one_row_per_step(backend: Backend, cell: 
     backend.rest()
     backend.brake()
     work = backend.work()
-    assert isinstance(work, Work)
+    assert isinstance(work, MotorWork)
     assert work.speed.shape == work.torque.shape == (5, 6)
     assert np.isfinite(work.speed).all()
     assert np.isfinite(work.torque).all()

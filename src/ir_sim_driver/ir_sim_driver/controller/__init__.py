@@ -5,7 +5,7 @@ it.
 from ir_sim_driver.controller.driver import Driver, Snapshot
 from ir_sim_driver.controller.goal_checks import VettedGoal
 from ir_sim_driver.controller.goals import NO_GOAL, ended_by_stop, refused
-from ir_sim_driver.controller.outputs import Entry, Frame, Joints, report
+from ir_sim_driver.controller.outputs import Frame, Joints, PartStatus, report
 from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
 from ir_sim_driver.controller.simulation import Simulation, make_simulation
 from ir_sim_driver.controller.supervision import SupervisionSettings
@@ -15,9 +15,9 @@ __all__ = [
     "NO_GOAL",
     "ControllerSettings",
     "Driver",
-    "Entry",
     "Frame",
     "Joints",
+    "PartStatus",
     "PlannedCell",
     "Simulation",
     "SimulationSettings",

@@ -419,7 +419,7 @@ _ORDERS = np.arange(6)
 _SHIFT = np.array([[math.comb(k, j) for k in range(6)] for j in range(6)], dtype=float)  # Taylor's
 
 
-class Piece(NamedTuple):
+class PathPiece(NamedTuple):
     """A part of a path with coefficients (S, n, 6) and durations (S,) [s] along which the distances
     (Z,) [m] must be kept.
     """
@@ -447,15 +447,15 @@ class Keep:
             return self.outside
         return self.inside
 
-    def pieces(self, coefficients: FloatArray, durations: FloatArray) -> Iterator[Piece]:
+    def pieces(self, coefficients: FloatArray, durations: FloatArray) -> Iterator[PathPiece]:
         """The path of segments (S, n, 6) with durations (S,) [s], one piece after the other."""
         if self.inside is None:
-            yield Piece(coefficients, durations, self.outside)
+            yield PathPiece(coefficients, durations, self.outside)
             return
         parts, spans, inside = self._divided(coefficients, durations)
         bounds = [0, *(np.flatnonzero(np.diff(inside)) + 1).tolist(), len(spans)]
         for a, b in pairwise(bounds):
-            yield Piece(parts[a:b], spans[a:b], self.inside if inside[a] else self.outside)
+            yield PathPiece(parts[a:b], spans[a:b], self.inside if inside[a] else self.outside)
 
     def _divided(
         self, coefficients: FloatArray, durations: FloatArray

@@ -23,11 +23,17 @@ from ir_sim_driver.controller.access import Access, CellSide, PlcSide
 from ir_sim_driver.controller.cell_scene import ContactScene, MachinesInScene, Parts
 from ir_sim_driver.controller.contacts import ContactWatch
 from ir_sim_driver.controller.goals import NO_GOAL, Goals, refused
-from ir_sim_driver.controller.outputs import Entry, Frame, Frames, Joints, report
+from ir_sim_driver.controller.outputs import Frame, FrameMaker, Joints, PartStatus, report
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.controller.surroundings import PlannedCell
 from ir_sim_driver.errors import BackendError, RequestRefusedError, TrajectoryRefusedError
-from ir_sim_driver.motion import ExecutionSettings, Following, Motion, Outcome, TrajectoryGoal
+from ir_sim_driver.motion import (
+    ExecutionSettings,
+    Following,
+    GoalOutcome,
+    PathMotion,
+    TrajectoryGoal,
+)
 from ir_sim_driver.notices import Level, Notice
 from ir_sim_driver.plant import Carried, Plant
 from ir_sim_driver.plc import OWN_BITS, STOP_BIT, giver_of
@@ -118,7 +124,7 @@ class Snapshot:
     """What a person is shown: notices since the last snapshot, and the parts of the driver."""
 
     notices: list[Notice]
-    entries: list[Entry]
+    entries: list[PartStatus]
 
 
 class Driver:
@@ -137,7 +143,7 @@ class Driver:
         self._lock = self._access.lock
         self._stamp = 0
         self._goals = Goals(simulation, self._lock, lambda: self._stamp)
-        self._frames = Frames(simulation, steps)
+        self._frames = FrameMaker(simulation, steps)
         self.plc = PlcSide(self._access)
         self.cell_side = CellSide(self._access)
         self.joint_names = tuple(simulation.robot.joint_names)
@@ -190,7 +196,7 @@ class Driver:
         self,
         points: int,
         read: Callable[[], TrajectoryGoal],
-        ended: Callable[[Outcome], None],
+        ended: Callable[[GoalOutcome], None],
         ticket: int = 0,
     ) -> int:
         """Check a goal beside everything else and start it; returns its ticket.
@@ -241,7 +247,7 @@ class Driver:
             backend = self._simulation.backend
             return self._simulation.executor.following(backend.q, backend.qd)
 
-    def commanded_at(self, stamp_ns: int) -> Motion:
+    def commanded_at(self, stamp_ns: int) -> PathMotion:
         """Commanded motion at a time of the plant [ns]. Raises RequestRefusedError: before the
         movement, off the network.
         """

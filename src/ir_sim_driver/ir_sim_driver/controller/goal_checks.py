@@ -11,15 +11,15 @@ import numpy as np
 from ir_description import RobotModel
 from ir_kernels.collision import COLLIDES, FREE
 from ir_kernels.dynamics import DynamicsModel
-from ir_sim_driver.controller.cell_scene import ContactScene, Keep, Piece
+from ir_sim_driver.controller.cell_scene import ContactScene, Keep, PathPiece
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import (
-    Driven,
+    CurrentPath,
     ErrorCode,
     ExecutionSettings,
-    Motion,
+    LeadPath,
     Path,
-    Route,
+    PathMotion,
     TrajectoryGoal,
     check_goal,
     check_trajectory,
@@ -57,12 +57,12 @@ def check_collision(path: Path, segments: slice, offset: float, keep: Keep) -> N
             )
 
 
-def _bounded(pieces: Iterable[Piece]) -> Iterator[Piece]:
+def _bounded(pieces: Iterable[PathPiece]) -> Iterator[PathPiece]:
     """The pieces in parts of at most _PIECES segments."""
     for piece in pieces:
         for first in range(0, len(piece.durations), _PIECES):
             part = slice(first, first + _PIECES)
-            yield Piece(piece.coefficients[part], piece.durations[part], piece.thresholds)
+            yield PathPiece(piece.coefficients[part], piece.durations[part], piece.thresholds)
 
 
 def _check_point(q: FloatArray, keep: Keep) -> None:
@@ -103,13 +103,13 @@ class VettedGoal:
 
     def route(
         self,
-        now: Motion,
+        now: PathMotion,
         robot: RobotModel,
         dynamics: DynamicsModel,
         settings: ExecutionSettings,
         delay: float,
-        driven: Driven | None = None,
-    ) -> Route:
+        driven: CurrentPath | None = None,
+    ) -> LeadPath:
         """Path from the commanded motion `now`, or on the movement that is driven, onto the
         trajectory. Raises TrajectoryRefusedError.
         """

@@ -15,7 +15,7 @@ from ir_msgs_py.stops import stop_count
 from ir_sim_driver.controller.goal_checks import VettedGoal
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.errors import TrajectoryRefusedError
-from ir_sim_driver.motion import ErrorCode, ExecutionSettings, Outcome, TrajectoryGoal
+from ir_sim_driver.motion import ErrorCode, ExecutionSettings, GoalOutcome, TrajectoryGoal
 
 QUEUE_MAX = 32  # a flood is refused before it fills the memory; a sender waits for its goal anyway
 POINT_BYTES = 1000  # of a point as Python objects and arrays, while its goal waits: measured 900
@@ -24,7 +24,7 @@ _MB = 1_000_000
 _AGAIN = 3  # times that a goal is checked again because the cell has changed
 
 Read = Callable[[], TrajectoryGoal]
-Ended = Callable[[Outcome], None]
+Ended = Callable[[GoalOutcome], None]
 
 
 @dataclass
@@ -203,7 +203,7 @@ class Goals:
             ticket in self._running and self._running[ticket] == self._simulation.executor.goal_id
         )
 
-    def take_calls(self, outcomes: Sequence[Outcome]) -> list[tuple[Ended, Outcome]]:
+    def take_calls(self, outcomes: Sequence[GoalOutcome]) -> list[tuple[Ended, GoalOutcome]]:
         """Senders of these outcomes and of goals that a stop has ended, to be called when the lock
         is free again. The lock is held.
         """
@@ -220,7 +220,7 @@ class Goals:
                 calls.append((sender, outcome))
         return calls
 
-    def drop(self, sentence: str) -> list[tuple[Ended, Outcome]]:
+    def drop(self, sentence: str) -> list[tuple[Ended, GoalOutcome]]:
         """End all goals, those that were started and those that were not. The lock is held."""
         self._dead = sentence
         senders = [*(ended for _, ended in self._waiting.values()), *self._queue.clear()]
@@ -249,7 +249,7 @@ class Goals:
         if refusal is not None and ended is not None:
             ended(refusal)
 
-    def _start(self, ticket: int, vetted: VettedGoal) -> tuple[Ended | None, Outcome | None]:
+    def _start(self, ticket: int, vetted: VettedGoal) -> tuple[Ended | None, GoalOutcome | None]:
         """Start a checked goal; its sender, and why it can't start. The lock is held."""
         simulation = self._simulation
         ended = self._queue.sender(ticket)
@@ -277,6 +277,6 @@ class Goals:
         return vetted
 
 
-def refused(sentence: str, code: int = ErrorCode.INVALID_GOAL) -> Outcome:
+def refused(sentence: str, code: int = ErrorCode.INVALID_GOAL) -> GoalOutcome:
     """Outcome of a goal that was not started."""
-    return Outcome(NO_GOAL, ErrorCode(code), sentence)
+    return GoalOutcome(NO_GOAL, ErrorCode(code), sentence)

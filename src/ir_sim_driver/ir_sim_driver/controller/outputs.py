@@ -57,7 +57,7 @@ class Frame:
     stopped: bool = False
 
 
-class Frames:
+class FrameMaker:
     """Makes frames of `simulation`, which is stepped `steps` times between two of them."""
 
     def __init__(self, simulation: Simulation, steps: int) -> None:
@@ -149,7 +149,7 @@ class Frames:
 # Entries of /diagnostics, without messages.
 
 
-class Entry(NamedTuple):
+class PartStatus(NamedTuple):
     """One part of the driver."""
 
     name: str
@@ -163,7 +163,7 @@ _LAG_SHOWN = 0.5  # s; people and timeouts notice no shorter one
 
 def report(
     simulation: Simulation, worst_lag: float, failure: str = "", lag: float = 0.0
-) -> list[Entry]:
+) -> list[PartStatus]:
     """Controller, executor and plant; the controller's entries are STALE while it is off the
     network.
 
@@ -179,7 +179,7 @@ def report(
     elif lag > _LAG_SHOWN:
         level = Level.WARN
         sentence = f"{lag:.1f} s behind the clock: this machine is too slow, or loaded"
-    plant = Entry(
+    plant = PartStatus(
         "ir_sim_driver: plant",
         level,
         sentence,
@@ -196,13 +196,13 @@ def report(
         asleep = f"{simulation.modes.mode.name}: no data, only Wake-on-LAN is heard"
         return [
             plant,
-            Entry("ir_sim_driver: controller", Level.STALE, asleep, {}),
-            Entry("ir_sim_driver: executor", Level.STALE, asleep, {}),
+            PartStatus("ir_sim_driver: controller", Level.STALE, asleep, {}),
+            PartStatus("ir_sim_driver: executor", Level.STALE, asleep, {}),
         ]
     return [plant, _controller(simulation), _executor(simulation)]
 
 
-def _controller(simulation: Simulation) -> Entry:
+def _controller(simulation: Simulation) -> PartStatus:
     mode = simulation.modes.mode
     last = simulation.notices.last
     level = Level.OK
@@ -212,7 +212,7 @@ def _controller(simulation: Simulation) -> Entry:
         sentence = simulation.fault or "emergency stop: release it, then recover"
     elif last is not None and last.level is not Level.OK:
         level, sentence = last
-    return Entry(
+    return PartStatus(
         "ir_sim_driver: controller",
         level,
         sentence,
@@ -226,7 +226,7 @@ def _controller(simulation: Simulation) -> Entry:
     )
 
 
-def _executor(simulation: Simulation) -> Entry:
+def _executor(simulation: Simulation) -> PartStatus:
     executor = simulation.executor
     load = simulation.load_checks.last
     level = Level.OK
@@ -238,7 +238,7 @@ def _executor(simulation: Simulation) -> Entry:
     if load is not None and load.noticed:
         level = Level.WARN
         sentence = load.sentence
-    return Entry(
+    return PartStatus(
         "ir_sim_driver: executor",
         level,
         sentence,

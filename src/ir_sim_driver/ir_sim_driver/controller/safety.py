@@ -10,7 +10,7 @@ import numpy as np
 from ir_description import RobotModel
 from ir_msgs_py.status import StatusCode
 from ir_sim_driver.controller.settings import SimulationSettings
-from ir_sim_driver.controller.supervision import Command, Fault, Supervision
+from ir_sim_driver.controller.supervision import CommandedPosition, Fault, Supervision
 from ir_sim_driver.errors import BackendError, RequestRefusedError
 from ir_sim_driver.motion import ErrorCode, Executor, Path, ToolPoint
 from ir_sim_driver.notices import Level, Notices
@@ -25,7 +25,7 @@ _AHEAD = 2.0  # s of path that a stop can cover at most
 _SAMPLES = 400
 
 
-class Excursion:
+class StopExcursion:
     """Collects configurations (n,) while the robot stops; `distance` is the farthest the tool was
     from the path ahead.
     """
@@ -82,7 +82,7 @@ class EmergencyStop:
         self._reaction = reaction
         self._open = 0
         self._powered = False
-        self._running: Excursion | None = None
+        self._running: StopExcursion | None = None
         self.excursion = 0.0
 
     @property
@@ -97,7 +97,7 @@ class EmergencyStop:
         executor = self._executor
         q = self._backend.q
         self._running = (
-            None if braked else Excursion(self._tool, executor.path, executor.path_parameter, q)
+            None if braked else StopExcursion(self._tool, executor.path, executor.path_parameter, q)
         )
         self._open = 0 if braked else self._reaction
         self._powered = powered
@@ -192,7 +192,7 @@ class Safety:
 
     def supervise(self, motors_on: bool, tube: float) -> None:
         """Look at the robot after a step; tube [m]: how far the tool may be from its command."""
-        command = Command(self._executor.command, self._deviation(motors_on), tube)
+        command = CommandedPosition(self._executor.command, self._deviation(motors_on), tube)
         fault = self._supervision.look(self._backend, command, self.stopped or not motors_on)
         if fault is not None and not self.fault:
             self._stop_for(fault)

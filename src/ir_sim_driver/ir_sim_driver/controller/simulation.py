@@ -34,7 +34,7 @@ from ir_sim_driver.motion import (
     ErrorCode,
     ExecutionSettings,
     Executor,
-    Outcome,
+    GoalOutcome,
     ToolPoint,
     TrajectoryGoal,
     manual_scaling,
@@ -71,7 +71,7 @@ class Outcomes:
         self._load_checks = load_checks
         self._goals = 0
         self._energy = 0.0
-        self._ended: list[Outcome] = []
+        self._ended: list[GoalOutcome] = []
 
     def next_id(self) -> int:
         """Id of the goal that starts now."""
@@ -91,7 +91,7 @@ class Outcomes:
             energy = self._mains.energy() - self._energy
             self._ended.append(self._completed(replace(outcome, energy=energy)))
 
-    def _completed(self, outcome: Outcome) -> Outcome:
+    def _completed(self, outcome: GoalOutcome) -> GoalOutcome:
         contact = self._cell_watch.last
         if (
             outcome.code is ErrorCode.CONTACT and contact is not None
@@ -100,7 +100,7 @@ class Outcomes:
             return replace(outcome, contact=contact, sentence=contact.sentence)
         return outcome.weighed(self._load_checks.ended(outcome.label))
 
-    def take(self) -> list[Outcome]:
+    def take(self) -> list[GoalOutcome]:
         """Goals that ended since the last call."""
         ended = self._ended
         self._ended = []
@@ -289,7 +289,7 @@ class Simulation:
         """Stop whatever runs along its path, for this reason."""
         self.executor.stop(ErrorCode.INVALID_GOAL, sentence)
 
-    def take_outcomes(self) -> list[Outcome]:
+    def take_outcomes(self) -> list[GoalOutcome]:
         """Goals that ended since the last call."""
         return self._outcomes.take()
 

@@ -79,7 +79,7 @@ class Fault(NamedTuple):
     code: ErrorCode = ErrorCode.PATH_TOLERANCE_VIOLATED
 
 
-class Command(NamedTuple):
+class CommandedPosition(NamedTuple):
     """Commanded position q (n,) [rad], deviation [m] of the tool from it, and the largest that is
     allowed.
     """
@@ -123,7 +123,7 @@ class Supervision:
         rows = np.stack((low, high, self._speed, self._change), axis=1)
         self._bounds: list[list[float]] = rows.tolist()
 
-    def look(self, backend: Backend, command: Command, braking: bool) -> Fault | None:
+    def look(self, backend: Backend, command: CommandedPosition, braking: bool) -> Fault | None:
         """What is wrong now. command: of the last step; braking: motors are off, the brakes close
         or hold.
         """
@@ -173,7 +173,7 @@ class Supervision:
             f"{beyond[j]:.3g} rad"
         )
 
-    def _left_tube(self, q: FloatArray, command: Command) -> Fault | None:
+    def _left_tube(self, q: FloatArray, command: CommandedPosition) -> Fault | None:
         if command.deviation <= command.tube:
             return None
         error = command.q - q

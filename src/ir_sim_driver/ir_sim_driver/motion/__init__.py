@@ -4,31 +4,31 @@ from ir_sim_driver.motion.executor import Executor, Following
 from ir_sim_driver.motion.goal import (
     ErrorCode,
     ExecutionSettings,
+    GoalOutcome,
     JointTolerance,
-    Outcome,
     TrajectoryGoal,
 )
-from ir_sim_driver.motion.path import Motion, Path
+from ir_sim_driver.motion.path import Path, PathMotion
 from ir_sim_driver.motion.tool_point import ToolPoint, manual_scaling
 from ir_sim_driver.motion.trajectory_checks import (
-    Driven,
-    Route,
+    CurrentPath,
+    LeadPath,
     check_goal,
     check_trajectory,
     checked_route,
 )
 
 __all__ = [
-    "Driven",
+    "CurrentPath",
     "ErrorCode",
     "ExecutionSettings",
     "Executor",
     "Following",
+    "GoalOutcome",
     "JointTolerance",
-    "Motion",
-    "Outcome",
+    "LeadPath",
     "Path",
-    "Route",
+    "PathMotion",
     "ToolPoint",
     "TrajectoryGoal",
     "check_goal",

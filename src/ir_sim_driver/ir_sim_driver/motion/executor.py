@@ -17,13 +17,13 @@ from ir_kernels.dynamics import DynamicsModel
 from ir_sim_driver.motion.goal import (
     ErrorCode,
     ExecutionSettings,
-    Outcome,
-    Tolerances,
+    GoalOutcome,
+    GoalTolerances,
     TrajectoryGoal,
 )
-from ir_sim_driver.motion.path import Motion, Path
+from ir_sim_driver.motion.path import Path, PathMotion
 from ir_sim_driver.motion.tool_point import EXACT_FROM, ToolPoint
-from ir_sim_driver.motion.trajectory_checks import Driven, Route
+from ir_sim_driver.motion.trajectory_checks import CurrentPath, LeadPath
 from ir_sim_driver.plant import Backend
 from ir_values.arrays import FloatArray
 
@@ -77,7 +77,7 @@ class PathSpeed:
         """Take another shortest stop [s]."""
         self._rate = 1.0 / stop_time
 
-    def advance(self, target: float, motion: Motion) -> float:
+    def advance(self, target: float, motion: PathMotion) -> float:
         """Step towards another target; the path time [s] covered. motion: at the present path
         time.
         """
@@ -91,7 +91,7 @@ class PathSpeed:
         self.value = min(max(after, 0.0), 1.0)
         return 0.5 * (before + self.value) * self._dt
 
-    def _bounds(self, motion: Motion, braking: bool) -> tuple[float, float]:
+    def _bounds(self, motion: PathMotion, braking: bool) -> tuple[float, float]:
         """Range of sdd within the limits; when it is empty: what exceeds them least while slowing
         down.
         """
@@ -128,10 +128,10 @@ def _range(slope: FloatArray, base: FloatArray, limit: FloatArray) -> tuple[floa
 class _Run:
     """The goal that is executed and how far it is."""
 
-    outcome: Outcome  # as it would end now
-    route: Route
-    path_tolerance: Tolerances
-    goal_tolerance: Tolerances
+    outcome: GoalOutcome  # as it would end now
+    route: LeadPath
+    path_tolerance: GoalTolerances
+    goal_tolerance: GoalTolerances
     goal_time: float
     label: str
     wait: int  # steps until it may start
@@ -153,7 +153,7 @@ class Following:
     (n,).
     """
 
-    command: Motion
+    command: PathMotion
     q: FloatArray
     qd: FloatArray
     label: str
@@ -186,7 +186,7 @@ class Executor:
         self._still: FloatArray = np.zeros(len(q))
         self._run: _Run | None = None
         self._fresh = False
-        self._outcomes: list[Outcome] = []
+        self._outcomes: list[GoalOutcome] = []
         self.command: FloatArray = np.array(q)
         self.deviation = 0.0
 
@@ -226,12 +226,12 @@ class Executor:
         return None if self._run is None else self._run.route.path
 
     @property
-    def driven(self) -> Driven | None:
+    def driven(self) -> CurrentPath | None:
         """The movement that another may join; None where none goes on."""
         run = self._run
         if run is None or run.stopping or run.wait > 0 or run.s >= run.route.path.duration:
             return None
-        return Driven(run.route.path, run.s)
+        return CurrentPath(run.route.path, run.s)
 
     @property
     def path_parameter(self) -> float:
@@ -253,16 +253,16 @@ class Executor:
         self.stop_time = settings.stop_time
         self._speed.set_stop_time(settings.stop_time)
 
-    def motion(self) -> Motion:
+    def motion(self) -> PathMotion:
         """The commanded motion now."""
         run = self._run
         v = self.path_speed
         if run is None or v == 0.0:
-            return Motion(self.command, self._still, self._still)
+            return PathMotion(self.command, self._still, self._still)
         path = run.route.path.motion(run.s)
-        return Motion(self.command, path.qd * v, path.qdd * v**2)
+        return PathMotion(self.command, path.qd * v, path.qdd * v**2)
 
-    def motion_in(self, seconds: float) -> Motion | None:
+    def motion_in(self, seconds: float) -> PathMotion | None:
         """The commanded motion so many seconds from now, before now where below 0, as the movement
         goes on at its present speed; None before the movement began.
         """
@@ -274,7 +274,7 @@ class Executor:
         if s < 0.0:
             return None if seconds < 0.0 else self.motion()
         path = run.route.path.motion(s)
-        return Motion(path.q, path.qd * v, path.qdd * v**2)
+        return PathMotion(path.q, path.qd * v, path.qdd * v**2)
 
     def following(self, q: FloatArray, qd: FloatArray) -> Following:
         """How the robot at q, qd (n,) follows."""
@@ -282,7 +282,9 @@ class Executor:
             self.motion(), q, qd, self.label, self.path_time, self.path_speed, self.deviation
         )
 
-    def start(self, goal_id: int, goal: TrajectoryGoal, route: Route, delay: float = 0.0) -> None:
+    def start(
+        self, goal_id: int, goal: TrajectoryGoal, route: LeadPath, delay: float = 0.0
+    ) -> None:
         """Follow the route, which starts at the commanded motion; a running goal ends as
         preempted.
         """
@@ -295,14 +297,14 @@ class Executor:
                 )
             self._finish()
         s = self._settings
-        path_tolerance = Tolerances.of(self._names, goal.path_tolerance, s.path_tolerance)
+        path_tolerance = GoalTolerances.of(self._names, goal.path_tolerance, s.path_tolerance)
         quiet = self._tool.quiet_bound(path_tolerance.position)
         label = goal.label or goal.trajectory.trajectory_id
         self._run = _Run(
-            Outcome(goal_id, ErrorCode.SUCCESSFUL, "", label=label),
+            GoalOutcome(goal_id, ErrorCode.SUCCESSFUL, "", label=label),
             route,
             path_tolerance,
-            Tolerances.of(self._names, goal.goal_tolerance, s.goal_tolerance),
+            GoalTolerances.of(self._names, goal.goal_tolerance, s.goal_tolerance),
             goal.settling_time(s),
             label,
             max(0, round(delay / self._dt)),
@@ -338,7 +340,7 @@ class Executor:
         self.command = np.array(q)
         self.deviation = 0.0
 
-    def take_outcomes(self) -> list[Outcome]:
+    def take_outcomes(self) -> list[GoalOutcome]:
         """Goals that have ended since the last call."""
         outcomes = self._outcomes
         self._outcomes = []

@@ -87,7 +87,7 @@ class TrajectoryGoal:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class GoalOutcome:
     """How goal `goal_id` ended.
 
     canceled: on request of its sender. max_tool_deviation [m] between commanded and simulated tcp;
@@ -109,7 +109,7 @@ class Outcome:
     load_check: LoadFinding | None = None
     contact: Contact | None = None
 
-    def weighed(self, finding: LoadFinding | None) -> Outcome:
+    def weighed(self, finding: LoadFinding | None) -> GoalOutcome:
         """With what was found of the load, and its sentence where something was noticed."""
         if finding is None:
             return self
@@ -121,7 +121,7 @@ class Outcome:
 
 
 @dataclass(frozen=True, eq=False)
-class Tolerances:
+class GoalTolerances:
     """Largest errors (n,) of position [rad] and speed [rad/s]; infinite where unbounded."""
 
     position: FloatArray
@@ -131,7 +131,7 @@ class Tolerances:
     @classmethod
     def of(
         cls, joint_names: Sequence[str], given: Sequence[JointTolerance], default: float
-    ) -> Tolerances:
+    ) -> GoalTolerances:
         """Arrays in the robot's joint order; 0 means the default [rad] (speed: unbounded), -1
         unbounded. Joints that the robot doesn't have are left out.
         """

@@ -13,7 +13,7 @@ from ir_values.arrays import FloatArray
 _DERIVATIVE = np.arange(6.0)
 
 
-class Motion(NamedTuple):
+class PathMotion(NamedTuple):
     """Position (n,) [rad] and its first two derivatives by path time."""
 
     q: FloatArray
@@ -83,13 +83,13 @@ class Path:
         some = durations > 0.0
         return coefficients[some], durations[some]
 
-    def motion(self, s: float) -> Motion:
+    def motion(self, s: float) -> PathMotion:
         """Position and derivatives at path time s; derivatives are zero before the start and after
         the end.
         """
         if s < 0.0 or s > self.duration or not self._starts:
             rest = np.zeros(len(self.start))
-            return Motion(self.position(s), rest, rest)
+            return PathMotion(self.position(s), rest, rest)
         segment = bisect_right(self._starts, s) - 1
         t = min(s - self._starts[segment], self._lengths[segment])
         c = self._c[segment]
@@ -98,10 +98,10 @@ class Path:
         twice = np.zeros(6)
         once[1:] = _DERIVATIVE[1:] * powers[:5]
         twice[2:] = (_DERIVATIVE[2:] * _DERIVATIVE[1:5]) * powers[:4]
-        return Motion(powers @ c, once @ c, twice @ c)
+        return PathMotion(powers @ c, once @ c, twice @ c)
 
 
-def quintic(before: Motion, after: Motion, duration: float) -> FloatArray:
+def quintic(before: PathMotion, after: PathMotion, duration: float) -> FloatArray:
     """Coefficients (1, n, 6) of the polynomial that leads from one motion to another in `duration`
     [s].
     """

@@ -22,7 +22,7 @@ from ir_sim_driver.motion.goal import (
     JointTolerance,
     TrajectoryGoal,
 )
-from ir_sim_driver.motion.path import Motion, Path, quintic
+from ir_sim_driver.motion.path import Path, PathMotion, quintic
 from ir_values.arrays import BoolArray, FloatArray
 from ir_values.errors import JointNamesError
 
@@ -33,23 +33,23 @@ from ir_values.errors import JointNamesError
 # nothing is sampled.
 
 
-class Range(NamedTuple):
+class PositionRange(NamedTuple):
     """Smallest and largest position (n,) [rad]."""
 
     low: FloatArray
     high: FloatArray
 
     @classmethod
-    def of(cls, robot: RobotModel) -> Range:
+    def of(cls, robot: RobotModel) -> PositionRange:
         """The robot's own."""
         return cls(robot.position_min, robot.position_max)
 
-    def including(self, q: FloatArray) -> Range:
+    def including(self, q: FloatArray) -> PositionRange:
         """This range and q (n,): who is outside may come back, and go no farther out."""
-        return Range(np.minimum(self.low, q), np.maximum(self.high, q))
+        return PositionRange(np.minimum(self.low, q), np.maximum(self.high, q))
 
     @classmethod
-    def along(cls, trajectory: JointTrajectory, robot: RobotModel) -> Range:
+    def along(cls, trajectory: JointTrajectory, robot: RobotModel) -> PositionRange:
         """The robot's own; a joint that begins at most OUTSIDE_MAX beyond it and ends in it leads
         back, and goes no farther out. Whether the robot stands there is checked at the start.
         """
@@ -75,7 +75,7 @@ def check_limits(
     robot: RobotModel,
     dynamics: DynamicsModel,
     settings: ExecutionSettings,
-    allowed: Range | None = None,
+    allowed: PositionRange | None = None,
 ) -> None:
     """Raise TrajectoryRefusedError naming joint, time, value, limit and excess where a limit is
     exceeded first: of position, velocity, acceleration or torque, in this order.
@@ -95,7 +95,7 @@ def check_limits(
     starts = start + np.concatenate(([0.0], np.cumsum(durations)[:-1]))
     names = robot.joint_names
     slack = 1.0 + settings.limit_slack
-    allowed = allowed or Range.of(robot)
+    allowed = allowed or PositionRange.of(robot)
     found = [
         _position_excess(position, starts, names, allowed, settings.position_slack),
         _excess(speed, starts, names, robot.velocity_max, slack, "rad/s"),
@@ -109,7 +109,7 @@ def check_limits(
 
 
 def _position_excess(
-    found: Extrema, starts: FloatArray, names: Sequence[str], allowed: Range, slack: float
+    found: Extrema, starts: FloatArray, names: Sequence[str], allowed: PositionRange, slack: float
 ) -> _Excess | None:
     low = _first(~(found.minimum >= allowed.low - slack), found.time_of_minimum, starts)
     high = _first(~(found.maximum <= allowed.high + slack), found.time_of_maximum, starts)
@@ -201,7 +201,7 @@ AT_REST = 1e-6  # rad/s that still count as standing
 
 
 @dataclass(frozen=True, eq=False)
-class Route:
+class LeadPath:
     """A path and the path time [s] at which its trajectory starts; the first `lead` segments are
     not the trajectory's. joined: they are those of the movement that is driven, at its present
     speed.
@@ -213,7 +213,7 @@ class Route:
     joined: bool = False
 
 
-class Driven(NamedTuple):
+class CurrentPath(NamedTuple):
     """The path of the movement that is driven, and the path time [s] that it has reached."""
 
     path: Path
@@ -228,8 +228,8 @@ _JOINED = (1e-6, 1e-4, 1e-2)
 
 
 def joining(
-    trajectory: JointTrajectory, driven: Driven, settings: ExecutionSettings, delay: float
-) -> Route | None:
+    trajectory: JointTrajectory, driven: CurrentPath, settings: ExecutionSettings, delay: float
+) -> LeadPath | None:
     """The movement that is driven as far as the trajectory begins on it, in its motion, and then
     the trajectory; None where it doesn't begin there. delay [s]: until its time 0 by its header
     stamp, which counts within bridge_time, 0: none.
@@ -256,17 +256,17 @@ def joining(
     coefficients, durations = path.between(s, at)
     own, seconds = trajectory.coefficients()
     whole = _path([coefficients, own], [durations, seconds], path.position(s))
-    return Route(whole, float(durations.sum()), len(durations), joined=True)
+    return LeadPath(whole, float(durations.sum()), len(durations), joined=True)
 
 
 def route_onto(
     trajectory: JointTrajectory,
-    now: Motion,
+    now: PathMotion,
     acceleration_max: FloatArray,
     settings: ExecutionSettings,
     delay: float,
     share: float,
-) -> Route:
+) -> LeadPath:
     """Path from the commanded motion `now` onto and along the trajectory that is executed.
 
     acceleration_max (n,) [rad/s^2]. delay [s]: until time 0 of the trajectory, below 0 since; a
@@ -283,22 +283,24 @@ def route_onto(
     coefficients, durations = trajectory.coefficients()
     if first > 0.0:
         lead = quintic(now, _motion_at_point(trajectory, 0), first)
-        return Route(_path([lead, coefficients], [np.array([first]), durations], now.q), 0.0, 1)
+        return LeadPath(_path([lead, coefficients], [np.array([first]), durations], now.q), 0.0, 1)
     _check_start(trajectory, now, acceleration_max, settings)
     if moving or np.abs(_motion_at_point(trajectory, 0).qd).max() > AT_REST:
         return _bridged(trajectory, now, settings.bridge_time)
     delta = np.abs(trajectory.positions[0] - now.q)
     if delta.max() <= _SAME:
-        return Route(Path(coefficients, durations, trajectory.positions[0]), 0.0, 0)
+        return LeadPath(Path(coefficients, durations, trajectory.positions[0]), 0.0, 0)
     T = math.sqrt(_PEAK * float((delta / acceleration_max).max()) / share)
     still = np.zeros_like(delta)
-    closing = quintic(Motion(now.q, still, still), Motion(trajectory.positions[0], still, still), T)
-    return Route(_path([closing, coefficients], [np.array([T]), durations], now.q), T, 1)
+    closing = quintic(
+        PathMotion(now.q, still, still), PathMotion(trajectory.positions[0], still, still), T
+    )
+    return LeadPath(_path([closing, coefficients], [np.array([T]), durations], now.q), T, 1)
 
 
 def _bridged(
-    trajectory: JointTrajectory, now: Motion, bridge_time: float, late: float = 0.0
-) -> Route:
+    trajectory: JointTrajectory, now: PathMotion, bridge_time: float, late: float = 0.0
+) -> LeadPath:
     """Onto the first point that is at least bridge_time [s] ahead, `late` [s] after time 0."""
     coefficients, durations = trajectory.coefficients()
     if len(durations) == 0 and trajectory.times[0] <= late:
@@ -310,14 +312,14 @@ def _bridged(
     bridge_time = float(trajectory.times[k]) - late
     bridge = quintic(now, _motion_at_point(trajectory, k), bridge_time)
     pieces = [bridge, coefficients[k:]], [np.array([bridge_time]), durations[k:]]
-    return Route(_path(*pieces, now.q), -late, 1)
+    return LeadPath(_path(*pieces, now.q), -late, 1)
 
 
 def _path(coefficients: list[FloatArray], durations: list[FloatArray], rest: FloatArray) -> Path:
     return Path(np.concatenate(coefficients), np.concatenate(durations), rest)
 
 
-def _motion_at_point(trajectory: JointTrajectory, k: int) -> Motion:
+def _motion_at_point(trajectory: JointTrajectory, k: int) -> PathMotion:
     """Motion right after point k; what a trajectory does not say comes from its own polynomial. At
     rest there is no acceleration but what it says: to meet that of a polynomial, what leads there
     would swing back, the farther the longer it lasts.
@@ -331,12 +333,12 @@ def _motion_at_point(trajectory: JointTrajectory, k: int) -> Motion:
         v = still
     if trajectory.accelerations is None and not v.any():
         a = still
-    return Motion(trajectory.positions[k], v, a)
+    return PathMotion(trajectory.positions[k], v, a)
 
 
 def _check_start(
     trajectory: JointTrajectory,
-    now: Motion,
+    now: PathMotion,
     acceleration_max: FloatArray,
     settings: ExecutionSettings,
 ) -> None:
@@ -453,19 +455,19 @@ def _check_segments(
     with np.errstate(over="ignore", invalid="ignore"):
         coefficients, durations = trajectory.coefficients()
     start = float(trajectory.times[0])
-    allowed = Range.along(trajectory, robot)
+    allowed = PositionRange.along(trajectory, robot)
     check_limits(coefficients, durations, start, robot, dynamics, settings, allowed)
 
 
 def checked_route(
     trajectory: JointTrajectory,
-    now: Motion,
+    now: PathMotion,
     robot: RobotModel,
     dynamics: DynamicsModel,
     settings: ExecutionSettings,
     delay: float = 0.0,
-    driven: Driven | None = None,
-) -> Route:
+    driven: CurrentPath | None = None,
+) -> LeadPath:
     """Path from the commanded motion `now` along a trajectory that passed check_trajectory. driven:
     the movement that goes on, which it may join.
 
@@ -475,13 +477,13 @@ def checked_route(
     a time. One that is _HARMLESS is never refused.
     delay [s]: until time 0 of the trajectory. Raises TrajectoryRefusedError.
     """
-    allowed = Range.of(robot).including(now.q)
+    allowed = PositionRange.of(robot).including(now.q)
     joined = None if driven is None else joining(trajectory, driven, settings, delay)
     if joined is not None:
         _check_lead(joined, robot, dynamics, settings, allowed)
         return joined
 
-    def route(share: float) -> Route:
+    def route(share: float) -> LeadPath:
         return route_onto(trajectory, now, robot.acceleration_max, settings, delay, share)
 
     for share in _GENTLENESS:
@@ -503,11 +505,11 @@ def checked_route(
 
 
 def _check_lead(
-    route: Route,
+    route: LeadPath,
     robot: RobotModel,
     dynamics: DynamicsModel,
     settings: ExecutionSettings,
-    allowed: Range,
+    allowed: PositionRange,
 ) -> None:
     """Raise TrajectoryRefusedError where what leads in exceeds a limit."""
     coefficients = route.path.coefficients[: route.lead]
@@ -520,7 +522,7 @@ def _check_points(
 ) -> None:
     """Name the point that is outside: more use to its sender than the instant between points."""
     q = trajectory.positions
-    allowed = Range.along(trajectory, robot)
+    allowed = PositionRange.along(trajectory, robot)
     over = np.maximum(q - allowed.high, allowed.low - q) > settings.position_slack
     if over.any():
         k, j = (int(i) for i in np.argwhere(over)[0])

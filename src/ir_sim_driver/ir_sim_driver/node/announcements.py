@@ -36,7 +36,7 @@ from ir_values.arrays import FloatArray
 _CONTACTS = QoSProfile(depth=100)
 
 
-class Announcements:
+class DriverAnnouncements:
     """Of `driver`, by `node`; now: time of the plant; load_changed: called when the robot carries
     another load, and at the start.
 

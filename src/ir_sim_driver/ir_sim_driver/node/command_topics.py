@@ -11,7 +11,7 @@ from ir_msgs_py import names
 from ir_msgs_py.names import own
 from ir_msgs_py.ros.rclpy_inside import can_take_messages, take_bytes
 from ir_sim_driver.controller import Driver, refused
-from ir_sim_driver.motion import ErrorCode, Outcome, TrajectoryGoal
+from ir_sim_driver.motion import ErrorCode, GoalOutcome, TrajectoryGoal
 from ir_sim_driver.node.messages import goal_from_trajectory
 from ir_sim_driver.node.trajectory_actions import Admit, TrajectoryReader
 
@@ -64,6 +64,6 @@ class TrajectoryTopic:
         else:
             self._driver.submit(0, read, self._ended, admission.ticket)
 
-    def _ended(self, outcome: Outcome) -> None:
+    def _ended(self, outcome: GoalOutcome) -> None:
         if outcome.code is not ErrorCode.SUCCESSFUL:
             self._driver.warn(f"trajectory of the topic: {outcome.sentence} ({outcome.code.name})")

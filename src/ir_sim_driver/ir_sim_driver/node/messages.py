@@ -15,7 +15,7 @@ from ir_msgs_py.ros.conversions import (
     trajectory_from_msg,
 )
 from ir_msgs_py.ros.diagnostics import Condition
-from ir_sim_driver.controller import Entry
+from ir_sim_driver.controller import PartStatus
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.load_check import LoadFinding
 from ir_sim_driver.motion import ErrorCode, Following, JointTolerance, TrajectoryGoal
@@ -100,7 +100,7 @@ def hardware_id(robot: RobotModel) -> str:
     return f"{robot.title or robot.name}, simulated"
 
 
-def condition_of(entry: Entry, hardware: str) -> Condition:
+def condition_of(entry: PartStatus, hardware: str) -> Condition:
     """A part of the driver for /diagnostics; hardware: see `hardware_id`."""
     return Condition(entry.name, entry.level, entry.sentence, entry.values, hardware)
 

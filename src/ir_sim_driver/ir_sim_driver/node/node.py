@@ -33,7 +33,7 @@ from ir_msgs_py.ros.topics import ACTION_SERVICES
 from ir_msgs_py.stops import before_first_stop
 from ir_sim_driver.controller import Driver, Joints, Simulation, ended_by_stop, make_simulation
 from ir_sim_driver.errors import DriverError, LinkError, TrajectoryRefusedError
-from ir_sim_driver.node.announcements import Announcements
+from ir_sim_driver.node.announcements import DriverAnnouncements
 from ir_sim_driver.node.command_topics import TrajectoryTopic
 from ir_sim_driver.node.controller_interface import (
     StateQueries,
@@ -166,7 +166,9 @@ class SimDriver(Node):
         self._transforms = open_transforms(self, self._driver, self._configuration.node.publish_tf)
         if self._transforms is not None:
             self.create_timer(_TRANSFORMS_PERIOD, self._publish_transforms)
-        self._announcements = Announcements(self, self._driver, self.now_msg, self._load_changed)
+        self._announcements = DriverAnnouncements(
+            self, self._driver, self.now_msg, self._load_changed
+        )
 
     def _open_requests(self) -> None:
         self._actions = [self._serve_action(ExecuteTrajectory, own(names.EXECUTE_TRAJECTORY))]

@@ -136,7 +136,7 @@ class CommandThread:
 # The topic: presses that come before their turn, and all levels in order.
 
 
-class Heard(NamedTuple):
+class ReceivedPress(NamedTuple):
     """A message: when it was sent and came [ns], by clocks of the sender and of this process, and
     whether its publisher latches.
     """
@@ -180,7 +180,7 @@ class LevelOrder:
         self._ahead: dict[Key, int] = {}  # presses until their turn, and when they came
         self._owed: set[Key] = set()
 
-    def presses(self, heard: Sequence[Heard]) -> list[Key]:
+    def presses(self, heard: Sequence[ReceivedPress]) -> list[Key]:
         """The presses among the `heard` whose turn has not come."""
         found = []
         for each in heard:
@@ -198,7 +198,7 @@ class LevelOrder:
         """
         self._owed.update(presses)
 
-    def levels(self, came: Sequence[Heard]) -> Iterator[Told]:
+    def levels(self, came: Sequence[ReceivedPress]) -> Iterator[Told]:
         """What `came` in its turn and counts. Of a run of the same levels the first and the last
         do.
         """
@@ -219,7 +219,7 @@ class LevelOrder:
         if run is not None:
             yield run
 
-    def _told(self, each: Heard) -> Told | None:
+    def _told(self, each: ReceivedPress) -> Told | None:
         """A message in its turn; None where it doesn't count."""
         key = (each.sent, each.data)
         old = each.latching and each.sent < min(self._started, self._newest)
@@ -235,7 +235,7 @@ class LevelOrder:
         self._owed.discard(key)
         return told
 
-    def _is_overtaken(self, each: Heard) -> bool:
+    def _is_overtaken(self, each: ReceivedPress) -> bool:
         """Whether a press that was sent later, or this one, has been heard ahead of it."""
         while self._ahead:
             first = next(iter(self._ahead))
@@ -276,7 +276,7 @@ class PlcTopic:
 
             def called(data: bytes, latching: bool = latching) -> None:
                 now = time.time_ns()
-                self._write_all([Heard(now, time.monotonic_ns(), bytes(data), latching)])
+                self._write_all([ReceivedPress(now, time.monotonic_ns(), bytes(data), latching)])
 
             if can_poll():
                 polled = node.create_subscription(
@@ -300,7 +300,7 @@ class PlcTopic:
             self._order.owe(ahead if self._driver.stop_number == number else ahead[1:])
         return len(heard) + len(came)
 
-    def _write_all(self, came: Sequence[Heard]) -> None:
+    def _write_all(self, came: Sequence[ReceivedPress]) -> None:
         written: list[Written] = []
         for told in self._order.levels(came):
             levels = self._levels(told)
@@ -342,7 +342,7 @@ class PlcTopic:
             self._driver.warn(f"plc_inputs ignored: {error}")
 
 
-def _taken(subscriptions: Sequence[tuple[Any, bool]]) -> Iterator[Heard]:
+def _taken(subscriptions: Sequence[tuple[Any, bool]]) -> Iterator[ReceivedPress]:
     """What waits, at most a turn of each."""
     ahead = time.time_ns() - time.monotonic_ns()
     for subscription, latching in subscriptions:
@@ -352,7 +352,7 @@ def _taken(subscriptions: Sequence[tuple[Any, bool]]) -> Iterator[Heard]:
                 break
             data, info = taken
             came = _by_own_clock(info["received_timestamp"], ahead)
-            yield Heard(info["source_timestamp"], came, data, latching)
+            yield ReceivedPress(info["source_timestamp"], came, data, latching)
 
 
 def _by_own_clock(received: int, ahead: int) -> int:

@@ -18,7 +18,7 @@ from ir_msgs_py.ros.rclpy_inside import part, participant_of
 from ir_msgs_py.ros.serving import RecordedActionServer
 from ir_sim_driver.controller import Driver, refused
 from ir_sim_driver.load_check import LoadFinding
-from ir_sim_driver.motion import ErrorCode, Outcome, TrajectoryGoal
+from ir_sim_driver.motion import ErrorCode, GoalOutcome, TrajectoryGoal
 from ir_sim_driver.node.messages import fill_load_check, fill_points, goal_from_action
 from ir_values.errors import one_line
 
@@ -362,7 +362,7 @@ class Executions:
         limit = self._driver.max_points
         done = self._node.future()
 
-        def ended(outcome: Outcome) -> None:
+        def ended(outcome: GoalOutcome) -> None:
             done.set_result(outcome)
             self._node.wake()
 
@@ -389,7 +389,7 @@ class Executions:
                 self._driver.abandon(ticket, f"the goal has had no client for {seconds:g} s")
 
         end_feedback = self._node.every(FEEDBACK_PERIOD, report)
-        outcome: Outcome = await _awaitable(done)
+        outcome: GoalOutcome = await _awaitable(done)
         end_feedback()
         self._tickets.pop(key, None)
         self._canceled.discard(key)
@@ -404,7 +404,7 @@ class Executions:
         if ticket is not None:
             self._driver.cancel(ticket)
 
-    def _result(self, handle: Any, outcome: Outcome) -> Any:
+    def _result(self, handle: Any, outcome: GoalOutcome) -> Any:
         result = self._type.Result()
         result.error_code = int(outcome.code)
         result.error_string = one_line(outcome.sentence)
@@ -444,6 +444,6 @@ def _load_checks(finding: LoadFinding | None, stamp_ns: int) -> list[LoadCheck]:
     return [msg]
 
 
-def _awaitable(future: Any) -> Awaitable[Outcome]:
-    awaitable: Awaitable[Outcome] = future
+def _awaitable(future: Any) -> Awaitable[GoalOutcome]:
+    awaitable: Awaitable[GoalOutcome] = future
     return awaitable

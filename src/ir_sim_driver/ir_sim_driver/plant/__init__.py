@@ -2,7 +2,7 @@
 meter.
 """
 
-from ir_sim_driver.plant.backend import STANDING, Backend, Work
+from ir_sim_driver.plant.backend import STANDING, Backend, MotorWork
 from ir_sim_driver.plant.backends import BACKENDS, make_backend
 from ir_sim_driver.plant.control import ControlSettings
 from ir_sim_driver.plant.ideal_backend import IdealBackend
@@ -37,10 +37,10 @@ __all__ = [
     "DescriptionFileError",
     "IdealBackend",
     "MeterReading",
+    "MotorWork",
     "Plant",
     "PowerMeter",
     "PyBulletBackend",
-    "Work",
     "carried",
     "custom_load",
     "ideal_plant",

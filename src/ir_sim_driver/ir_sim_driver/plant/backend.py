@@ -17,7 +17,7 @@ STANDING = 1e-3
 """Speed [rad/s] below which a joint stands."""
 
 
-class Work(NamedTuple):
+class MotorWork(NamedTuple):
     """What the motors did in K steps: their speed (K, n) [rad/s] in the middle of the step, torque
     (K, n) [Nm], both seen at the joint.
     """
@@ -84,5 +84,5 @@ class Backend(Protocol):
     def rest(self) -> None:
         """Make a step of dt with closed brakes: nothing moves, no torque."""
 
-    def work(self) -> Work:
+    def work(self) -> MotorWork:
         """What the motors did since the last call."""

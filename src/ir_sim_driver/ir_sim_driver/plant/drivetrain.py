@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ir_description import RobotModel
-from ir_sim_driver.plant.backend import Work
+from ir_sim_driver.plant.backend import MotorWork
 from ir_sim_driver.plant.plant_parameters import REFERENCE_TEMPERATURE, DriveFigures, GearFigures
 from ir_values.arrays import FloatArray
 
@@ -41,7 +41,7 @@ class DriveLosses:
         self._figures = figures
         self._ratio = np.array(ratio)
 
-    def power(self, work: Work, powered: FloatArray) -> AxisPower:
+    def power(self, work: MotorWork, powered: FloatArray) -> AxisPower:
         """Power in K steps; powered (K,): 1 in steps with motors on, else 0."""
         f = self._figures
         torque = work.torque / self._ratio

@@ -13,7 +13,7 @@ import numpy as np
 
 from ir_description import Load, RobotModel
 from ir_kernels.dynamics import DynamicsModel
-from ir_sim_driver.plant.backend import STANDING, Work
+from ir_sim_driver.plant.backend import STANDING, MotorWork
 from ir_values.arrays import FloatArray
 
 BRAKE_FACTOR = 2.0
@@ -30,7 +30,7 @@ class IdealBackend:
         self._brake_step: FloatArray = BRAKE_FACTOR * dt * np.array(robot.acceleration_max)
         self.disturbance: FloatArray | None = None
         n = len(robot.joint_names)
-        self._done = Work(np.empty((0, n)), np.empty((0, n)))
+        self._done = MotorWork(np.empty((0, n)), np.empty((0, n)))
         self._last: FloatArray = np.zeros(n)
         self._dynamics = DynamicsModel(robot, (), self._base_pose)
         self._path: list[FloatArray] = []  # two positions more than unsettled steps
@@ -109,12 +109,12 @@ class IdealBackend:
         self._settle()
         return self._last
 
-    def work(self) -> Work:
+    def work(self) -> MotorWork:
         """Torques of the steps since the last call."""
         self._settle()
         done = self._done
         empty = np.empty((0, len(self.q)))
-        self._done = Work(empty, empty)
+        self._done = MotorWork(empty, empty)
         return done
 
     def _go(self, q_next: FloatArray, driven: bool) -> None:
@@ -141,4 +141,4 @@ class IdealBackend:
         if len(self._done.speed):
             speed = np.vstack((self._done.speed, speed))
             torque = np.vstack((self._done.torque, torque))
-        self._done = Work(speed, torque)
+        self._done = MotorWork(speed, torque)

@@ -14,7 +14,7 @@ import numpy as np
 
 from ir_kernels.power import Regeneration
 from ir_msgs_py.modes import DRIVES_ON, Mode
-from ir_sim_driver.plant.backend import Work
+from ir_sim_driver.plant.backend import MotorWork
 from ir_sim_driver.plant.drivetrain import DriveLosses
 from ir_sim_driver.plant.plant_parameters import LinkFigures, Plant, StandingWatts
 from ir_values.arrays import FloatArray
@@ -352,7 +352,7 @@ class PowerMeter:
         self._loads.append((steps, base_power, tool_power, powered, whole, drive_bus))
         self._pending += steps
 
-    def settle(self, work: Work) -> None:
+    def settle(self, work: MotorWork) -> None:
         """Take what the motors did in the steps that were added since the last call, one row per
         step.
         """

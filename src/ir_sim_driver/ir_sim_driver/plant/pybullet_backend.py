@@ -14,7 +14,7 @@ from scipy.linalg.lapack import dposv
 
 from ir_description import Load, RobotModel
 from ir_sim_driver.errors import BackendError
-from ir_sim_driver.plant.backend import STANDING, Work
+from ir_sim_driver.plant.backend import STANDING, MotorWork
 from ir_sim_driver.plant.control import ControlSettings, ServoControl
 from ir_sim_driver.plant.drivetrain import Drivetrain, Gears
 from ir_sim_driver.plant.plant_parameters import Plant
@@ -30,7 +30,7 @@ _ULPS = 1000  # of a figure that are tried, relative 2e-13; one mass in ten is e
 _THICKNESS = 1e-6  # share of the largest principal moment; a thousand times finer than it is known
 
 
-class Body(NamedTuple):
+class PhysicsBody(NamedTuple):
     """A link: mass [kg], centre (3,) [m] and principal moments (3,) [kg m^2] about it in its frame,
     whose pose in that of the link before is pose (4, 4); it turns about axis (3,).
     """
@@ -42,7 +42,7 @@ class Body(NamedTuple):
     axis: FloatArray
 
 
-def bodies_of(robot: RobotModel, loads: Sequence[Load]) -> list[Body]:
+def bodies_of(robot: RobotModel, loads: Sequence[Load]) -> list[PhysicsBody]:
     """The n bodies that move; the loads (in the last link's frame) are parts of the last one."""
     bodies = []
     before = np.eye(3)
@@ -59,12 +59,12 @@ def bodies_of(robot: RobotModel, loads: Sequence[Load]) -> list[Body]:
         pose[:3, :3] = before.T @ pose[:3, :3] @ turn
         axis = _unit(turn.T @ np.asarray(robot.joint_axis[i]))
         com = turn.T @ com
-        bodies.append(Body(_symmetrical(mass, com), com, _thick(moments), pose, axis))
+        bodies.append(PhysicsBody(_symmetrical(mass, com), com, _thick(moments), pose, axis))
         before = turn
     return bodies
 
 
-def urdf_of(robot: RobotModel, bodies: Sequence[Body]) -> str:
+def urdf_of(robot: RobotModel, bodies: Sequence[PhysicsBody]) -> str:
     """The URDF text of the bodies on a base that is fixed."""
     low = np.array(robot.position_min).tolist()
     high = np.array(robot.position_max).tolist()
@@ -502,11 +502,11 @@ class PyBulletBackend:
         self._speeds.append(self._rest)
         self._torques.append(self._still)
 
-    def work(self) -> Work:
+    def work(self) -> MotorWork:
         """Speed and torque of the motors in every step since the last call."""
         shape = (len(self._speeds), self._n)
         speed = self._coupling.motors(np.array(self._speeds).reshape(shape))
-        work = Work(speed, np.array(self._torques).reshape(shape))
+        work = MotorWork(speed, np.array(self._torques).reshape(shape))
         self._speeds.clear()
         self._torques.clear()
         return work

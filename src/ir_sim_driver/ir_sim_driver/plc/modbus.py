@@ -330,7 +330,7 @@ _DROPPED = (OSError, TimeoutError, asyncio.IncompleteReadError)  # how connectio
 
 
 @dataclass(frozen=True)
-class Limits:
+class ClientLimits:
     """Clients at once; idle [s]: how long one may be silent, and take to read its answer."""
 
     connections: int = 16
@@ -345,9 +345,11 @@ class ModbusServer:
     its connection.
     """
 
-    def __init__(self, host: str, port: int, tables: Tables, limits: Limits | None = None) -> None:
+    def __init__(
+        self, host: str, port: int, tables: Tables, limits: ClientLimits | None = None
+    ) -> None:
         self._tables = tables
-        self._limits = limits or Limits()
+        self._limits = limits or ClientLimits()
         self._heard: dict[
             asyncio.StreamWriter, float
         ] = {}  # last request, or begin, of each client [s]
@@ -507,7 +509,7 @@ class ModbusTcp:
     def open(self, controller: Controller) -> OpenLink:
         """Serve the controller. Raises LinkError when the port is taken."""
         tables = ControllerTables(controller, self.modbus_watchdog)
-        limits = Limits(self.modbus_connections, self.modbus_idle)
+        limits = ClientLimits(self.modbus_connections, self.modbus_idle)
         try:
             return ModbusServer(self.modbus_host, self.modbus_port, tables, limits)
         except OSError as error:

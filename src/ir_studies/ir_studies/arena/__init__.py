@@ -1,11 +1,11 @@
 """The arena: planners against each other over cells, tasks, seeds, payloads and timings."""
 
-from ir_studies.arena.runs import Finished, run_arena
+from ir_studies.arena.runs import FinishedArena, run_arena
 from ir_studies.arena.settings import (
     EXAMPLE,
     PORTFOLIO,
+    ArenaEntry,
     ArenaSettings,
-    Entry,
     arena_settings,
     read_settings,
 )
@@ -13,9 +13,9 @@ from ir_studies.arena.settings import (
 __all__ = [
     "EXAMPLE",
     "PORTFOLIO",
+    "ArenaEntry",
     "ArenaSettings",
-    "Entry",
-    "Finished",
+    "FinishedArena",
     "arena_settings",
     "read_settings",
     "run_arena",

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from ir_studies.arena.settings import Entry
+from ir_studies.arena.settings import ArenaEntry
 from ir_studies.work import Row
 from ir_values.arrays import FloatArray
 
@@ -23,10 +23,10 @@ Cell = str | float | int
 
 
 @dataclass(frozen=True)
-class Run:
+class ArenaRun:
     """An entry with its row."""
 
-    entry: Entry
+    entry: ArenaEntry
     row: Row
 
     @property
@@ -51,7 +51,7 @@ class Run:
         return [(pair[0], pair[1]) for pair in found] if isinstance(found, list) else []
 
 
-def asked_alike(runs: Sequence[Run]) -> tuple[Run, ...]:
+def asked_alike(runs: Sequence[ArenaRun]) -> tuple[ArenaRun, ...]:
     """The runs, where one that was cut or died knows from others of its question whether the
     straight movement is free.
     """
@@ -62,13 +62,13 @@ def asked_alike(runs: Sequence[Run]) -> tuple[Run, ...]:
     )
 
 
-def columns(runs: Sequence[Run]) -> dict[str, list[Cell]]:
+def columns(runs: Sequence[ArenaRun]) -> dict[str, list[Cell]]:
     """The table by its columns."""
     rows = [_cells(run) for run in runs]
     return {name: [row[name] for row in rows] for name in _cells(runs[0])} if rows else {}
 
 
-def _cells(run: Run) -> dict[str, Cell]:
+def _cells(run: ArenaRun) -> dict[str, Cell]:
     return {
         **asdict(run.entry),
         "free_ptp": int(run.free_ptp),
@@ -108,7 +108,7 @@ class Figures:
         return self.solved / self.count if self.count else math.nan
 
 
-def best_costs(runs: Iterable[Run], name: str = "cost_j") -> dict[Question, float]:
+def best_costs(runs: Iterable[ArenaRun], name: str = "cost_j") -> dict[Question, float]:
     """The least figure of each question, whoever found it."""
     best: dict[Question, float] = {}
     for run in runs:
@@ -118,7 +118,7 @@ def best_costs(runs: Iterable[Run], name: str = "cost_j") -> dict[Question, floa
     return best
 
 
-def figures(planner: str, runs: Sequence[Run]) -> Figures:
+def figures(planner: str, runs: Sequence[ArenaRun]) -> Figures:
     """The figures of a planner among runs of all of them."""
     J = best_costs(runs)
     W = best_costs(runs, "movement_cost")
@@ -150,7 +150,7 @@ class Compared:
     lower: int
 
 
-def compared(planner: str, other: str, runs: Sequence[Run], tie: float = 0.0) -> Compared:
+def compared(planner: str, other: str, runs: Sequence[ArenaRun], tie: float = 0.0) -> Compared:
     """A planner against another one; what differs by less than the share `tie` of J is not
     lower.
     """
@@ -163,14 +163,18 @@ def compared(planner: str, other: str, runs: Sequence[Run], tie: float = 0.0) ->
     return Compared(len(ratios), _median(ratios), sum(ratio < 1.0 - tie for ratio in ratios))
 
 
-def success_over_time(planners: Sequence[str], runs: Sequence[Run], time: FloatArray) -> FloatArray:
+def success_over_time(
+    planners: Sequence[str], runs: Sequence[ArenaRun], time: FloatArray
+) -> FloatArray:
     """Percent of the runs (N, planners) that were solved until each time (N,)."""
     return np.stack(
         [_solved_until([r for r in runs if r.entry.planner == p], time) for p in planners], 1
     )
 
 
-def cost_over_time(planners: Sequence[str], runs: Sequence[Run], time: FloatArray) -> FloatArray:
+def cost_over_time(
+    planners: Sequence[str], runs: Sequence[ArenaRun], time: FloatArray
+) -> FloatArray:
     """Median (N, planners) over the runs of J until each time (N,), in percent above the best
     known; NaN while fewer than half of them are solved.
     """
@@ -183,11 +187,13 @@ def cost_over_time(planners: Sequence[str], runs: Sequence[Run], time: FloatArra
     return np.where(np.isfinite(value), value, np.nan)
 
 
-def energy_and_time(planners: Sequence[str], runs: Sequence[Run]) -> dict[str, tuple[float, float]]:
+def energy_and_time(
+    planners: Sequence[str], runs: Sequence[ArenaRun]
+) -> dict[str, tuple[float, float]]:
     """Mean seconds and joules at the mains of each planner over the questions that all of them
     solved.
     """
-    by_planner: dict[str, dict[Question, list[Run]]] = {planner: {} for planner in planners}
+    by_planner: dict[str, dict[Question, list[ArenaRun]]] = {planner: {} for planner in planners}
     for run in runs:
         if run.solved and run.entry.planner in by_planner:
             by_planner[run.entry.planner].setdefault(run.entry.question, []).append(run)
@@ -200,7 +206,9 @@ def energy_and_time(planners: Sequence[str], runs: Sequence[Run]) -> dict[str, t
     }
 
 
-def _mean(own: Mapping[Question, Sequence[Run]], common: Iterable[Question], name: str) -> float:
+def _mean(
+    own: Mapping[Question, Sequence[ArenaRun]], common: Iterable[Question], name: str
+) -> float:
     return float(
         np.mean(
             [np.mean([run.number(name) for run in own[question]]) for question in sorted(common)]
@@ -208,12 +216,12 @@ def _mean(own: Mapping[Question, Sequence[Run]], common: Iterable[Question], nam
     )
 
 
-def _solved_until(own: Sequence[Run], time: FloatArray) -> FloatArray:
+def _solved_until(own: Sequence[ArenaRun], time: FloatArray) -> FloatArray:
     first = np.sort([run.number("first_s") for run in own if run.solved])
     return np.asarray(100.0 * np.searchsorted(first, time, side="right") / max(len(own), 1))
 
 
-def _ratio_until(run: Run, best: Mapping[Question, float], time: FloatArray) -> FloatArray:
+def _ratio_until(run: ArenaRun, best: Mapping[Question, float], time: FloatArray) -> FloatArray:
     """J so far (N,) over the best known, inf before the first answer."""
     if not run.solved or not run.progress:
         return np.full(len(time), np.inf)
@@ -236,16 +244,16 @@ def _median(values: Iterable[float]) -> float:
     return float(np.median(found)) if found else math.nan
 
 
-def blocked_and_free(runs: Sequence[Run]) -> tuple[list[Run], list[Run]]:
+def blocked_and_free(runs: Sequence[ArenaRun]) -> tuple[list[ArenaRun], list[ArenaRun]]:
     """Runs whose straight movement is blocked, and those whose is free."""
     return [run for run in runs if not run.free_ptp], [run for run in runs if run.free_ptp]
 
 
-def of_cell(runs: Iterable[Run], cell: str) -> list[Run]:
+def of_cell(runs: Iterable[ArenaRun], cell: str) -> list[ArenaRun]:
     """Runs in a cell."""
     return [run for run in runs if run.entry.cell == cell]
 
 
-def longest(runs: Iterable[Run]) -> float:
+def longest(runs: Iterable[ArenaRun]) -> float:
     """Seconds until the last run improved its answer, or ended."""
     return max((run.number("total_s") for run in runs if run.number("total_s") > 0.0), default=1.0)

@@ -21,7 +21,7 @@ from ir_msgs_py.report import PlanningInfo, TrajectoryReport
 from ir_planner import Goal, MovementPlan, Planner, PlannerError
 from ir_planner.scene import PROOF_TOLERANCE, PlanningScene
 from ir_planner.search.with_ompl import charge_to
-from ir_studies.arena.settings import PORTFOLIO, ArenaSettings, Entry, read_by, tasks_of
+from ir_studies.arena.settings import PORTFOLIO, ArenaEntry, ArenaSettings, read_by, tasks_of
 from ir_studies.work import Row
 from ir_studies.work.results import refuse_others
 
@@ -84,7 +84,7 @@ _FIRST = "first feasible"  # how the note of the stage begins that knew the firs
 
 
 def one_run(
-    entry: Entry, settings: ArenaSettings, planner: Planner, clock: Callable[[], float]
+    entry: ArenaEntry, settings: ArenaSettings, planner: Planner, clock: Callable[[], float]
 ) -> Row:
     """Figures of the run: seconds, joules, metres; NaN where nothing was certified."""
     start, goal = tasks_of(planner.cell)[entry.task]
@@ -137,7 +137,7 @@ def one_run(
 
 
 def _options(
-    entry: Entry, settings: ArenaSettings, request: int, left: float, margin: float
+    entry: ArenaEntry, settings: ArenaSettings, request: int, left: float, margin: float
 ) -> PlanOptions:
     """What a request of the run asks for, counted from 0, when so many seconds are left."""
     return PlanOptions(
@@ -233,7 +233,7 @@ def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
     excuse(start)
 
     def row_of(words: Mapping[str, Any]) -> Row:
-        entry = Entry(**words)
+        entry = ArenaEntry(**words)
         return {**one_run(entry, arena, planner_of(entry.cell), processor_time), "start_s": start}
 
     return row_of

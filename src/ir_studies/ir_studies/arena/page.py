@@ -26,8 +26,8 @@ from ir_recorder.report.shapes import body_mesh, capsule_mesh
 from ir_recorder.report.tables import table
 from ir_studies.arena.figures import (
     GRID,
+    ArenaRun,
     Figures,
-    Run,
     blocked_and_free,
     compared,
     cost_over_time,
@@ -118,14 +118,16 @@ _BLOCKED = "The straight movement is blocked"
 _FREE = "The straight movement is free"
 
 
-def write_page(runs: Sequence[Run], settings: ArenaSettings, path: Path, missing: int = 0) -> Path:
+def write_page(
+    runs: Sequence[ArenaRun], settings: ArenaSettings, path: Path, missing: int = 0
+) -> Path:
     """Write the page in place of another page; its absolute path. RecorderError when it can't be
     written.
     """
     return write_output(path, page_html(runs, settings, missing).encode(), PAGE_START, ANYWHERE)
 
 
-def page_html(runs: Sequence[Run], settings: ArenaSettings, missing: int = 0) -> str:
+def page_html(runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int = 0) -> str:
     """The page as text. missing: runs that were not made yet."""
     titles = _titles(settings.cells)
     every = [figures(planner, runs) for planner in settings.planners]
@@ -161,7 +163,7 @@ def page_html(runs: Sequence[Run], settings: ArenaSettings, missing: int = 0) ->
     return page("arena", parts, BUTTON)
 
 
-def _subtitle(runs: Sequence[Run], settings: ArenaSettings, missing: int) -> str:
+def _subtitle(runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int) -> str:
     questions = len({run.entry.question for run in runs})
     made = (
         f"{len(runs)} runs" if not missing else f"so far {len(runs)} of {len(runs) + missing} runs"
@@ -172,7 +174,7 @@ def _subtitle(runs: Sequence[Run], settings: ArenaSettings, missing: int) -> str
     return f"{asked}: {made} of {settings.seconds:g} s of processor"
 
 
-def _bindings(runs: Sequence[Run], planners: Sequence[str]) -> str:
+def _bindings(runs: Sequence[ArenaRun], planners: Sequence[str]) -> str:
     """What counts for planners of OMPL and what is not alike for them, where there are any."""
     names = [name for name in planners if name in SEARCHES and needs_ompl(SEARCHES[name])]
     if not names:
@@ -194,7 +196,7 @@ def _bindings(runs: Sequence[Run], planners: Sequence[str]) -> str:
     )
 
 
-def _least(runs: Sequence[Run]) -> str:
+def _least(runs: Sequence[ArenaRun]) -> str:
     known = [run.number("start_s") for run in runs if run.number("start_s") > 0.0]
     return f" ({milliseconds(float(np.median(known)))} each)" if known else ""
 
@@ -208,7 +210,7 @@ def _titles(cells: Sequence[str]) -> dict[str, str]:
     return {cell: name if names.count(name) == 1 else cell for cell, name in short.items()}
 
 
-def behind(runs: Sequence[Run], settings: ArenaSettings) -> list[str]:
+def behind(runs: Sequence[ArenaRun], settings: ArenaSettings) -> list[str]:
     """Where somebody solved more than the portfolio, or cost less, in sentences."""
     said: list[str] = []
     for cell, title in _titles(settings.cells).items():
@@ -222,7 +224,7 @@ def _judged(settings: ArenaSettings) -> bool:
     return PORTFOLIO in settings.planners and len(settings.planners) > 1
 
 
-def _badge(runs: Sequence[Run], settings: ArenaSettings) -> str:
+def _badge(runs: Sequence[ArenaRun], settings: ArenaSettings) -> str:
     if not _judged(settings):
         return ""
     if behind(runs, settings):
@@ -230,7 +232,7 @@ def _badge(runs: Sequence[Run], settings: ArenaSettings) -> str:
     return badge("Nobody is ahead of the portfolio", good=True)
 
 
-def verdict(runs: Sequence[Run], settings: ArenaSettings) -> str:
+def verdict(runs: Sequence[ArenaRun], settings: ArenaSettings) -> str:
     """Whether nobody solved more and cost less than the portfolio in any cell, or where not."""
     if not _judged(settings):
         return ""
@@ -287,7 +289,7 @@ def _tiles(found: Sequence[Figures]) -> str:
     return row_of(tiles)
 
 
-def _against(own: Sequence[Run], place: str, settings: ArenaSettings) -> Iterator[str]:
+def _against(own: Sequence[ArenaRun], place: str, settings: ArenaSettings) -> Iterator[str]:
     """Who solved more than the portfolio, and all whose J is lower in one sentence."""
     found = {planner: figures(planner, own) for planner in settings.planners}
     mine = found[PORTFOLIO]
@@ -310,7 +312,7 @@ def _against(own: Sequence[Run], place: str, settings: ArenaSettings) -> Iterato
 
 
 def _cell_section(
-    runs: Sequence[Run], name: str, titles: Mapping[str, str], planners: Sequence[str]
+    runs: Sequence[ArenaRun], name: str, titles: Mapping[str, str], planners: Sequence[str]
 ) -> str:
     """Picture, figures of blocked and of free pairs apart, and time against energy."""
     cell = load_cell(name)
@@ -362,7 +364,7 @@ def milliseconds(value: float) -> str:
 
 
 def _curves(
-    runs: Sequence[Run], titles: Mapping[str, str], planners: Sequence[str], end: float
+    runs: Sequence[ArenaRun], titles: Mapping[str, str], planners: Sequence[str], end: float
 ) -> Iterator[dict[str, Json]]:
     """Success and cost over time until `end` s, for all cells together and for each."""
     time = np.linspace(0.0, end, GRID)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from ir_recorder.report.files import write_output
 from ir_recorder.report.step_table import PARQUET_START, write_columns
-from ir_studies.arena.figures import Run, columns
+from ir_studies.arena.figures import ArenaRun, columns
 from ir_studies.arena.page import write_page
 from ir_studies.arena.settings import FORMAT, ArenaSettings, read_settings, settings_text
 from ir_studies.errors import FolderError, SettingsError
@@ -43,7 +43,7 @@ CREATE VIEW bestPlannerConfigs AS
 _STATUS = ("answered", "died", "cut")
 
 
-def write_database(runs: Sequence[Run], settings: ArenaSettings, path: Path) -> Path:
+def write_database(runs: Sequence[ArenaRun], settings: ArenaSettings, path: Path) -> Path:
     """Write the database in place of an earlier one. FolderError where that can't be done."""
     part = path.with_name(path.name + ".part")
     try:
@@ -62,12 +62,12 @@ def write_database(runs: Sequence[Run], settings: ArenaSettings, path: Path) -> 
     return path
 
 
-def _fill(database: sqlite3.Connection, runs: Sequence[Run], settings: ArenaSettings) -> None:
+def _fill(database: sqlite3.Connection, runs: Sequence[ArenaRun], settings: ArenaSettings) -> None:
     planners: dict[str, int] = {}
     for name in settings.planners:
         words = "INSERT INTO plannerConfigs (name, settings) VALUES (?, '')"
         planners[name] = int(database.execute(words, (name,)).lastrowid or 0)
-    by_question: dict[tuple[str, ...], list[Run]] = {}
+    by_question: dict[tuple[str, ...], list[ArenaRun]] = {}
     for run in runs:
         by_question.setdefault(run.entry.question, []).append(run)
     for question, own in by_question.items():
@@ -79,7 +79,7 @@ def _fill(database: sqlite3.Connection, runs: Sequence[Run], settings: ArenaSett
 def _experiment(
     database: sqlite3.Connection,
     question: Iterable[str],
-    runs: Sequence[Run],
+    runs: Sequence[ArenaRun],
     settings: ArenaSettings,
 ) -> int:
     total = sum(run.number("total_s") for run in runs if run.number("total_s") > 0.0)
@@ -95,7 +95,7 @@ def _experiment(
     return int(database.execute(words, values).lastrowid or 0)
 
 
-def _insert(database: sqlite3.Connection, run: Run, experiment: int, planner: int) -> None:
+def _insert(database: sqlite3.Connection, run: ArenaRun, experiment: int, planner: int) -> None:
     outcome = str(run.row.get("outcome", _STATUS[0]))
     figures = [
         run.number(name)
@@ -122,7 +122,12 @@ _CSV_START = b"planner,"
 
 
 def write_outputs(
-    runs: Sequence[Run], settings: ArenaSettings, folder: Path, missing: int = 0, *, parquet: bool
+    runs: Sequence[ArenaRun],
+    settings: ArenaSettings,
+    folder: Path,
+    missing: int = 0,
+    *,
+    parquet: bool,
 ) -> tuple[Path, ...]:
     """Write table.csv, table.parquet where that is asked for, arena.db and index.html. missing:
     runs that were not made yet.

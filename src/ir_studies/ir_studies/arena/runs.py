@@ -9,11 +9,11 @@ from dataclasses import asdict, dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from ir_studies.arena.figures import Run, asked_alike, blocked_and_free, figures
+from ir_studies.arena.figures import ArenaRun, asked_alike, blocked_and_free, figures
 from ir_studies.arena.planner_arena_database import write_outputs, write_settings
-from ir_studies.arena.settings import ArenaSettings, Entry, entries, read_by
+from ir_studies.arena.settings import ArenaEntry, ArenaSettings, entries, read_by
 from ir_studies.errors import StoppedError, StudyError, WorkerError
-from ir_studies.work import Means, Results, Task
+from ir_studies.work import Means, Results, StudyJob
 
 _COLUMNS = (
     "planner",
@@ -29,10 +29,10 @@ _COLUMNS = (
 
 
 @dataclass(frozen=True)
-class Finished:
+class FinishedArena:
     """Runs in the order of the settings, the files that were written, and what to know of them."""
 
-    runs: tuple[Run, ...]
+    runs: tuple[ArenaRun, ...]
     files: tuple[Path, ...]
     remark: str = ""
 
@@ -63,7 +63,7 @@ def run_arena(
     means: Means | None = None,
     *,
     parquet: bool = False,
-) -> Finished:
+) -> FinishedArena:
     """Run what the folder has no result of; interrupted, it writes what is known so far, and goes
     on from there the next time. Raises StudyError.
     """
@@ -72,24 +72,26 @@ def run_arena(
     means = means or Means()
     wanted = {entry.key: entry for entry in entries(settings)}
     read = read_by(settings.cells)
-    task = Task("arena", {**asdict(settings), "read": read}, settings.seconds + settings.hang_after)
+    task = StudyJob(
+        "arena", {**asdict(settings), "read": read}, settings.seconds + settings.hang_after
+    )
     with Results(Path(folder), "arena", settings.budget, read) as results:
         kept = write_settings(settings, Path(folder))
         missing = [entry.job for entry in wanted.values() if entry.key not in results.rows]
         begin = time.monotonic()
         before = len(wanted) - len(missing)
 
-        def write() -> Finished:
+        def write() -> FinishedArena:
             known = [
-                Run(entry, results.rows[k]) for k, entry in wanted.items() if k in results.rows
+                ArenaRun(entry, results.rows[k]) for k, entry in wanted.items() if k in results.rows
             ]
             runs = asked_alike(known)
             if not runs:
-                return Finished((), (kept,))
+                return FinishedArena((), (kept,))
             written = write_outputs(
                 runs, settings, Path(folder), len(wanted) - len(runs), parquet=parquet
             )
-            return Finished(runs, (*written, kept), results.remark)
+            return FinishedArena(runs, (*written, kept), results.remark)
 
         with _written_when_stopped(write), means.makers(task) as makers:
             for made, (job, row) in enumerate(makers.rows(missing), 1):
@@ -109,7 +111,7 @@ def _written_when_stopped(write: Callable[[], object]) -> Iterator[None]:
         raise
 
 
-def _words(entry: Entry, left: float) -> str:
+def _words(entry: ArenaEntry, left: float) -> str:
     cell = Path(entry.cell).name
     return f"{minutes(left)} left; {cell} {entry.task} by {entry.planner}, seed {entry.seed}: run"
 

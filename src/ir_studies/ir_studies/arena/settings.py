@@ -211,7 +211,7 @@ def _check_names(key: str, names: Any, *, may_be_empty: bool) -> None:
 
 
 @dataclass(frozen=True)
-class Entry:
+class ArenaEntry:
     """One run: a planner, a task of a cell as start->goal, a seed, what is attached, and the
     timing.
     """
@@ -239,7 +239,7 @@ class Entry:
         return self.cell, self.task, self.load, self.timing
 
 
-def entries(settings: ArenaSettings) -> list[Entry]:
+def entries(settings: ArenaSettings) -> list[ArenaEntry]:
     """All runs; planners change fastest and seeds slowest, so that what is there early is a fair
     part.
     """
@@ -258,11 +258,11 @@ def _chosen(cell: str, names: tuple[str, ...]) -> list[str]:
     return [name for name in tasks_of(load_cell(cell)) if not names or name in names]
 
 
-def _entries(settings: ArenaSettings, tasks: Mapping[str, list[str]]) -> Iterator[Entry]:
+def _entries(settings: ArenaSettings, tasks: Mapping[str, list[str]]) -> Iterator[ArenaEntry]:
     for seed in range(settings.seeds):
         for cell, names in tasks.items():
             for task in names:
                 for load in settings.loads:
                     for timing in settings.timings:
                         for planner in settings.planners:
-                            yield Entry(planner, cell, task, seed, load, timing)
+                            yield ArenaEntry(planner, cell, task, seed, load, timing)

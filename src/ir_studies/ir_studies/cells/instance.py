@@ -64,7 +64,7 @@ def _bends_up(degree: int, coefficient: float) -> bool:
 
 
 @dataclass(frozen=True)
-class Movement:
+class HopMovement:
     """One way to do a hop: from a place to a place."""
 
     number: int
@@ -74,17 +74,17 @@ class Movement:
 
 
 @dataclass(frozen=True)
-class Hop:
+class DynamicActivity:
     """A dynamic activity: from one stop to another, by one of its movements."""
 
     number: int
     start: int
     end: int
-    movements: tuple[Movement, ...]
+    movements: tuple[HopMovement, ...]
 
 
 @dataclass(frozen=True)
-class Place:
+class StopLocation:
     """A location of a stop; power: W by mode of the robot."""
 
     number: int
@@ -93,33 +93,33 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Stop:
+class StaticActivity:
     """A static activity: how long it may take, and where; closes: the last of the robot's cycle."""
 
     number: int
     least: float
     most: float
-    places: tuple[Place, ...]
+    places: tuple[StopLocation, ...]
     closes: bool = False
 
 
 @dataclass(frozen=True)
-class Robot:
+class InstanceRobot:
     """Stops and hops; modes: the shortest wait [s] by power mode."""
 
     name: str
-    stops: tuple[Stop, ...]
-    hops: tuple[Hop, ...]
+    stops: tuple[StaticActivity, ...]
+    hops: tuple[DynamicActivity, ...]
     modes: Mapping[int, float]
 
     @property
-    def closing(self) -> Stop:
+    def closing(self) -> StaticActivity:
         """The stop after which the cycle begins again."""
         return next(stop for stop in self.stops if stop.closes)
 
 
 @dataclass(frozen=True)
-class Lag:
+class TimeLag:
     """start of `later` - start of `earlier` >= length - height * cycle."""
 
     earlier: int
@@ -152,8 +152,8 @@ class Instance:
 
     name: str
     cycle: float
-    robots: tuple[Robot, ...]
-    lags: tuple[Lag, ...] = ()
+    robots: tuple[InstanceRobot, ...]
+    lags: tuple[TimeLag, ...] = ()
     handovers: tuple[Handover, ...] = ()
     conflicts: tuple[Conflict, ...] = ()
     robot_of: Mapping[int, int] = field(init=False)
@@ -167,7 +167,7 @@ class Instance:
 
 
 @dataclass(frozen=True)
-class Done:
+class ScheduledActivity:
     """An activity of a schedule: place or movement by its number, power mode of a stop (-1: a
     movement), start and duration [s], energy [J].
     """
@@ -184,7 +184,7 @@ class Done:
 class Schedule:
     """What each robot does in a cycle, in order."""
 
-    robots: tuple[tuple[Done, ...], ...]
+    robots: tuple[tuple[ScheduledActivity, ...], ...]
 
     @property
     def energy(self) -> float:
@@ -193,7 +193,7 @@ class Schedule:
 
 
 @dataclass(frozen=True)
-class Range:
+class ModeRange:
     """A range of durations of a stay at a place in which one power mode is cheapest."""
 
     mode: int
@@ -202,10 +202,12 @@ class Range:
     most: float
 
 
-def stay_ranges(stop: Stop, place: Place, modes: Mapping[int, float]) -> list[Range]:
+def stay_ranges(
+    stop: StaticActivity, place: StopLocation, modes: Mapping[int, float]
+) -> list[ModeRange]:
     """The lower envelope of power over duration: disjoint ranges, each with its cheapest mode."""
     begins = sorted({max(stop.least, shortest) for shortest in modes.values()})
-    ranges: list[Range] = []
+    ranges: list[ModeRange] = []
     for k, begin in enumerate(begins):
         end = begins[k + 1] if k + 1 < len(begins) else stop.most
         end = min(end, stop.most)
@@ -214,7 +216,7 @@ def stay_ranges(stop: Stop, place: Place, modes: Mapping[int, float]) -> list[Ra
         open_modes = [mode for mode, shortest in modes.items() if shortest <= begin]
         mode = min(open_modes, key=lambda each: (place.power[each], modes[each], each))
         if ranges and ranges[-1].mode == mode:
-            ranges[-1] = Range(mode, place.power[mode], ranges[-1].least, end)
+            ranges[-1] = ModeRange(mode, place.power[mode], ranges[-1].least, end)
         else:
-            ranges.append(Range(mode, place.power[mode], begin, end))
+            ranges.append(ModeRange(mode, place.power[mode], begin, end))
     return ranges

@@ -16,15 +16,15 @@ from dataclasses import dataclass, field
 
 from ir_planner.cycle import LinearProgram
 from ir_studies.cells.instance import (
-    Done,
-    Hop,
+    DynamicActivity,
+    HopMovement,
     Instance,
-    Lag,
-    Movement,
-    Range,
-    Robot,
+    InstanceRobot,
+    ModeRange,
     Schedule,
-    Stop,
+    ScheduledActivity,
+    StaticActivity,
+    TimeLag,
     stay_ranges,
 )
 from ir_values import FloatArray
@@ -38,8 +38,8 @@ _SAME = 1e-7  # of a curve: a tangent that close is there already
 class _Moving:
     """Variables of a movement."""
 
-    hop: Hop
-    movement: Movement
+    hop: DynamicActivity
+    movement: HopMovement
     on: int
     duration: int
     energy: int
@@ -50,9 +50,9 @@ class _Moving:
 class _Staying:
     """Variables of a stay at a place in a range of durations."""
 
-    stop: Stop
+    stop: StaticActivity
     place: int
-    range: Range
+    range: ModeRange
     on: int
     duration: int
 
@@ -61,7 +61,7 @@ class _Staying:
 class _Clock:
     """A robot: earliest and latest starts on its clock [s], and its variables."""
 
-    robot: Robot
+    robot: InstanceRobot
     phase: int = -1
     phase_low: float = 0.0
     phase_high: float = 0.0
@@ -102,7 +102,7 @@ class CellModel:
 
     # Bounds on each clock.
 
-    def _clock(self, robot: Robot) -> _Clock:
+    def _clock(self, robot: InstanceRobot) -> _Clock:
         cycle = self.instance.cycle
         closing = robot.closing.number
         stays = {stop.number: stop.least for stop in robot.stops}
@@ -199,7 +199,7 @@ class CellModel:
             p.row({s.on: 1.0 for s in self._stays_of.get(v, ())}, low=1.0, high=1.0)
             self._in_time(clock, stop, -cycle if v == closing else 0.0)
 
-    def _in_time(self, clock: _Clock, stop: Stop, rest: float) -> None:
+    def _in_time(self, clock: _Clock, stop: StaticActivity, rest: float) -> None:
         """Movements end when a stop begins, and begin when it ends."""
         v = stop.number
         arrive: Terms = {clock.start[v]: -1.0}
@@ -220,7 +220,7 @@ class CellModel:
 
     # Robots against each other.
 
-    def _bindings(self) -> list[tuple[_Event, Lag]]:
+    def _bindings(self) -> list[tuple[_Event, TimeLag]]:
         """Lags with the event that they begin at: all hops of a stop together are its end."""
         found = []
         groups: dict[tuple[int, int, float, int], set[int]] = {}
@@ -239,10 +239,10 @@ class CellModel:
                 if hops == leaving
                 else [_Event(start_of=hop) for hop in sorted(hops)]
             )
-            found += [(event, Lag(min(hops), later, length, height)) for event in events]
+            found += [(event, TimeLag(min(hops), later, length, height)) for event in events]
         return found
 
-    def _phases(self, bindings: list[tuple[_Event, Lag]]) -> None:
+    def _phases(self, bindings: list[tuple[_Event, TimeLag]]) -> None:
         """Ranges of the phases: as the lags leave them, a cycle where nothing binds them."""
         cycle = self.instance.cycle
         count = len(self._clocks)
@@ -267,7 +267,7 @@ class CellModel:
                         {self._clocks[j].phase: 1.0, self._clocks[i].phase: -1.0}, high=apart[i][j]
                     )
 
-    def _distances_of_phases(self, bindings: list[tuple[_Event, Lag]]) -> list[list[bool]]:
+    def _distances_of_phases(self, bindings: list[tuple[_Event, TimeLag]]) -> list[list[bool]]:
         """The largest differences of phases, and which robots lags connect at all."""
         cycle = self.instance.cycle
         count = len(self._clocks)
@@ -322,7 +322,7 @@ class CellModel:
         terms = {clock.phase: 1.0, clock.start[event.end_of]: 1.0}
         return terms | {s.duration: 1.0 for s in self._stays_of.get(event.end_of, ())}
 
-    def _lag(self, event: _Event, lag: Lag) -> None:
+    def _lag(self, event: _Event, lag: TimeLag) -> None:
         """later - earlier >= bound, less `spare` for each of the two that doesn't take place."""
         other = _Event(start_of=lag.later)
         terms = _sum(self._moment(other), self._moment(event), -1.0)
@@ -519,7 +519,7 @@ class CellModel:
         robots = []
         for clock in self._clocks:
             time = float(values[clock.phase]) - shift
-            done: list[Done] = []
+            done: list[ScheduledActivity] = []
             at = clock.robot.closing.number
             for _ in clock.robot.stops:
                 moving = moves[at]
@@ -527,7 +527,7 @@ class CellModel:
                 curve = moving.movement.curve
                 took = float(min(max(values[moving.duration], curve.least), curve.most))
                 done.append(
-                    Done(
+                    ScheduledActivity(
                         moving.hop.number,
                         moving.movement.number,
                         -1,
@@ -541,7 +541,9 @@ class CellModel:
                 stay = stays[at]
                 took = float(values[stay.duration])
                 done.append(
-                    Done(at, stay.place, stay.range.mode, time, took, stay.range.power * took)
+                    ScheduledActivity(
+                        at, stay.place, stay.range.mode, time, took, stay.range.power * took
+                    )
                 )
                 time += took
             robots.append(tuple(done))
@@ -565,7 +567,11 @@ def _sum(terms: Mapping[int, float], more: Mapping[int, float], factor: float) -
 
 
 def _distances(
-    robot: Robot, stays: Mapping[int, float], quickest: Mapping[int, float], *, forward: bool
+    robot: InstanceRobot,
+    stays: Mapping[int, float],
+    quickest: Mapping[int, float],
+    *,
+    forward: bool,
 ) -> dict[int, float]:
     """Least time from the begin of the cycle to the start of each stop; backward from the end of
     each stop to the end of the cycle.
@@ -582,7 +588,7 @@ def _distances(
     return found
 
 
-def _before(robot: Robot) -> dict[int, set[int]]:
+def _before(robot: InstanceRobot) -> dict[int, set[int]]:
     """By stop: stops that are surely passed after it, the closing one included."""
     closing = robot.closing.number
     after: dict[int, set[int]] = {}

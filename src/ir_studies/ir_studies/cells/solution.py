@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_studies.cells.instance import Instance, Robot, Schedule
+from ir_studies.cells.instance import Instance, InstanceRobot, Schedule
 from ir_studies.cells.model import CellModel
 from ir_values import FloatArray
 
@@ -81,7 +81,7 @@ def hurried(instance: Instance) -> Instance:
     return replace(instance, robots=robots, lags=(), handovers=(), conflicts=())
 
 
-def _hurried(robot: Robot) -> Robot:
+def _hurried(robot: InstanceRobot) -> InstanceRobot:
     hops = tuple(
         replace(
             hop,

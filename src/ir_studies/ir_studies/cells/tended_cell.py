@@ -18,14 +18,14 @@ import numpy as np
 from ir_planner import SteadyPlan
 from ir_planner.cycle import Curve, SteadyCycle, SteadyProblem, WaitMode
 from ir_studies.cells.instance import (
+    DynamicActivity,
     EnergyCurve,
-    Hop,
+    HopMovement,
     Instance,
-    Lag,
-    Movement,
-    Place,
-    Robot,
-    Stop,
+    InstanceRobot,
+    StaticActivity,
+    StopLocation,
+    TimeLag,
 )
 from ir_studies.errors import SettingsError
 
@@ -44,7 +44,7 @@ def tended_instance(plan: SteadyPlan) -> Instance:
             f"the cycle makes {plan.cycle.units} parts: only cycles of one are written"
         )
     made = _Tended(plan.problem, plan.cycle)
-    robot = Robot("robot", made.stops(), made.hops(), made.modes())
+    robot = InstanceRobot("robot", made.stops(), made.hops(), made.modes())
     return Instance(plan.cell.name, plan.cycle.period, (robot,), made.lags())
 
 
@@ -83,22 +83,24 @@ class _Tended:
         """Shortest waits by power mode."""
         return {k: mode.shortest for k, mode in enumerate(self.before[0])}
 
-    def stops(self) -> tuple[Stop, ...]:
+    def stops(self) -> tuple[StaticActivity, ...]:
         """Stays before and after every activity."""
         stays = [
             *((self._before(a), self.before[a]) for a in range(self._count)),
             *((self._after(a), self.after[a]) for a in range(self._count)),
         ]
         return tuple(
-            Stop(number, 0.0, self.cycle.period, self._places(number, modes), closes=number == 0)
+            StaticActivity(
+                number, 0.0, self.cycle.period, self._places(number, modes), closes=number == 0
+            )
             for number, modes in stays
         )
 
-    def _places(self, number: int, modes: tuple[WaitMode, ...]) -> tuple[Place, ...]:
+    def _places(self, number: int, modes: tuple[WaitMode, ...]) -> tuple[StopLocation, ...]:
         """One for each power mode; in it the others draw what motors do."""
         motors = modes[0].watts
         return tuple(
-            Place(
+            StopLocation(
                 k,
                 self._point(number, k),
                 {n: modes[n].watts if n == k else motors for n in range(len(modes))},
@@ -109,7 +111,7 @@ class _Tended:
     def _point(self, number: int, mode: int) -> int:
         return number * len(self.before[0]) + mode
 
-    def hops(self) -> tuple[Hop, ...]:
+    def hops(self) -> tuple[DynamicActivity, ...]:
         """Transports, and empty hops to every other activity."""
         found = [
             self._hop(
@@ -135,27 +137,27 @@ class _Tended:
 
     def _hop(
         self, number: int, start: int, end: int, curve: Curve, modes: tuple[WaitMode, ...]
-    ) -> Hop:
+    ) -> DynamicActivity:
         """From all places of a stay to all of another; to come to one costs its transitions."""
-        movements: list[Movement] = []
+        movements: list[HopMovement] = []
         for here in range(len(modes)):
             for there, mode in enumerate(modes):
                 for piece in _pieces(curve, mode.joules):
                     points = self._point(start, here), self._point(end, there)
-                    movements.append(Movement(len(movements), *points, piece))
-        return Hop(number, start, end, tuple(movements))
+                    movements.append(HopMovement(len(movements), *points, piece))
+        return DynamicActivity(number, start, end, tuple(movements))
 
-    def lags(self) -> tuple[Lag, ...]:
+    def lags(self) -> tuple[TimeLag, ...]:
         """A part is taken when its process is over, and the next one brought after that."""
         starts = {visit.activity: visit.start for visit in self.cycle.visits}
-        lags: list[Lag] = []
+        lags: list[TimeLag] = []
         for machine, seconds in enumerate(self.problem.process):
             over = int(starts[machine + 1] < starts[machine])
             end = self._after(machine)
-            lags.append(Lag(end, self._transport(machine + 1), seconds, over))
+            lags.append(TimeLag(end, self._transport(machine + 1), seconds, over))
             if machine > 0:  # the first activity begins the cycle
                 free = self._after(machine + 1)
-                lags.append(Lag(free, self._transport(machine), 0.0, 1 - over))
+                lags.append(TimeLag(free, self._transport(machine), 0.0, 1 - over))
         return tuple(lags)
 
 

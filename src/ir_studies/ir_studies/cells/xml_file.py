@@ -9,15 +9,15 @@ from xml.etree import ElementTree
 
 from ir_studies.cells.instance import (
     Conflict,
+    DynamicActivity,
     EnergyCurve,
     Handover,
-    Hop,
+    HopMovement,
     Instance,
-    Lag,
-    Movement,
-    Place,
-    Robot,
-    Stop,
+    InstanceRobot,
+    StaticActivity,
+    StopLocation,
+    TimeLag,
 )
 from ir_studies.errors import SettingsError
 from ir_values.errors import FileRefusedError
@@ -45,12 +45,12 @@ def read_instances(path: str | Path) -> list[Instance]:
         raise SettingsError(f"{path} holds no <instance>")
     names = [f"{Path(path).stem}_{k}" for k in range(len(found))]
     return [
-        _Reader(f"{path}: instance {k}", each).instance(name)
+        _InstanceReader(f"{path}: instance {k}", each).instance(name)
         for k, (name, each) in enumerate(zip(names, found, strict=True))
     ]
 
 
-class _Reader:
+class _InstanceReader:
     """Reads one instance; `place` begins every sentence."""
 
     def __init__(self, place: str, element: _Element) -> None:
@@ -76,7 +76,7 @@ class _Reader:
         clashes = tuple(self._conflict(each) for each in self._element.iter("collision-pair"))
         return Instance(name, cycle, robots, lags, fits, clashes)
 
-    def _robot(self, element: _Element, k: int) -> Robot:
+    def _robot(self, element: _Element, k: int) -> InstanceRobot:
         name = element.findtext("name") or f"robot {k}"
         modes: dict[int, float] = {}
         usual: dict[int, float] = {}
@@ -97,9 +97,11 @@ class _Reader:
         for hop in hops:
             if not {hop.start, hop.end} <= own:
                 raise self._refused(f"activity {hop.number} leads to another robot")
-        return Robot(name, stops, hops, modes)
+        return InstanceRobot(name, stops, hops, modes)
 
-    def _stop(self, element: _Element, modes: dict[int, float], usual: dict[int, float]) -> Stop:
+    def _stop(
+        self, element: _Element, modes: dict[int, float], usual: dict[int, float]
+    ) -> StaticActivity:
         number = self._activity(element)
         places = []
         for each in element.findall("locations/location"):
@@ -117,14 +119,14 @@ class _Reader:
             if point in self._stop_of:
                 raise self._refused(f"point {point} is named twice")
             self._stop_of[point] = number
-            places.append(Place(lid, point, power))
+            places.append(StopLocation(lid, point, power))
         if not places:
             raise self._refused(f"activity {number} has no location")
         least, most = self._durations(element, number)
         closes = element.get("last_in_cycle") in ("true", "1")
-        return Stop(number, least, most, tuple(places), closes)
+        return StaticActivity(number, least, most, tuple(places), closes)
 
-    def _hop(self, element: _Element) -> Hop:
+    def _hop(self, element: _Element) -> DynamicActivity:
         number = self._activity(element)
         movements = []
         ends = set()
@@ -145,20 +147,20 @@ class _Reader:
             if not terms:
                 raise self._refused(f"activity {number}: a movement has no energy-function")
             mid = self._choice(number, each.get("mid"))
-            movements.append(Movement(mid, start, end, EnergyCurve(terms, least, most)))
+            movements.append(HopMovement(mid, start, end, EnergyCurve(terms, least, most)))
         if len(ends) != 1:
             raise self._refused(
                 f"activity {number} must have movements, all between the same two activities"
             )
         start, end = ends.pop()
-        return Hop(number, start, end, tuple(movements))
+        return DynamicActivity(number, start, end, tuple(movements))
 
-    def _lag(self, element: _Element) -> Lag:
+    def _lag(self, element: _Element) -> TimeLag:
         earlier = self._known(element.findtext("from-activity"), "from-activity")
         later = self._known(element.findtext("to-activity"), "to-activity")
         length = self._number(element, "length")
         height = self._whole(element.findtext("height"), "height", least=-1000)
-        return Lag(earlier, later, length, height)
+        return TimeLag(earlier, later, length, height)
 
     def _handovers(self, element: _Element) -> Iterator[Handover]:
         pairs: dict[tuple[int, int], set[tuple[int, int]]] = {}
@@ -281,7 +283,7 @@ def _decimal(value: float) -> str:
     return f"{value:.9f}".rstrip("0").rstrip(".")
 
 
-def _write_robot(element: _Element, robot: Robot) -> None:
+def _write_robot(element: _Element, robot: InstanceRobot) -> None:
     _sub(element, "name", robot.name)
     activities = _sub(element, "activities")
     for stop in robot.stops:

@@ -2,8 +2,8 @@
 
 from ir_studies.layout.settings import (
     EXAMPLE,
-    Condition,
     LayoutSettings,
+    PlacementCondition,
     layout_settings,
     read_layout,
 )
@@ -11,9 +11,9 @@ from ir_studies.layout.study import Layouts, run_layout
 
 __all__ = [
     "EXAMPLE",
-    "Condition",
     "LayoutSettings",
     "Layouts",
+    "PlacementCondition",
     "layout_settings",
     "read_layout",
     "run_layout",

@@ -35,7 +35,7 @@ from ir_recorder.report.step_table import write_columns
 from ir_recorder.report.tables import table
 from ir_studies.layout.placement import Known, Variable
 from ir_studies.layout.search import GIVEN
-from ir_studies.layout.settings import Condition, LayoutSettings
+from ir_studies.layout.settings import LayoutSettings, PlacementCondition
 from ir_studies.layout.summary import Final, cost_words, ends, of_condition, sentences
 from ir_studies.page import page, settings_table
 from ir_values.arrays import FloatArray
@@ -518,7 +518,9 @@ def _named(path: Path, name: str) -> bool:
     return content.startswith(_CELL_START) and f"name: {name}".encode() in content.splitlines()
 
 
-def _row(k: int, known: Known, condition: Condition, settings: LayoutSettings) -> dict[str, Value]:
+def _row(
+    k: int, known: Known, condition: PlacementCondition, settings: LayoutSettings
+) -> dict[str, Value]:
     plan = known.plans.get(condition, {})
     kind, sentence = known.reason
     state = "impossible" if known.cost == math.inf else "planned" if known.planned else "looked at"

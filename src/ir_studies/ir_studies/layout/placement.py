@@ -294,7 +294,7 @@ FIRST_SEED = 0
 
 
 @dataclass(frozen=True)
-class Condition:
+class PlacementCondition:
     """What every placement is planned for: a cycle time (0: free) and the masses [kg] of parts."""
 
     cycle_time: float
@@ -329,7 +329,7 @@ class Placement:
         """What it is known by."""
         return text_of(self.values)
 
-    def look(self, conditions: Sequence[Condition]) -> Job:
+    def look(self, conditions: Sequence[PlacementCondition]) -> Job:
         """The job of a look at it."""
         payloads = [dict(one) for one in payloads_of(conditions)]
         return Job(
@@ -337,7 +337,9 @@ class Placement:
             {"stage": "look", "values": self.values, "payloads": payloads},
         )
 
-    def plan(self, condition: Condition, seed: int = FIRST_SEED, *, robots: bool = False) -> Job:
+    def plan(
+        self, condition: PlacementCondition, seed: int = FIRST_SEED, *, robots: bool = False
+    ) -> Job:
         """The job of its program in full; robots: with what the drawn robots add."""
         asked = {
             "values": self.values,
@@ -350,7 +352,7 @@ class Placement:
         return Job(f"{stage}|{self.key}|{condition.text}|{seed}", words)
 
 
-def payloads_of(conditions: Sequence[Condition]) -> list[tuple[tuple[str, float], ...]]:
+def payloads_of(conditions: Sequence[PlacementCondition]) -> list[tuple[tuple[str, float], ...]]:
     """The masses of parts, each once."""
     return list(dict.fromkeys(condition.payload for condition in conditions))
 
@@ -364,8 +366,8 @@ class Known:
 
     placement: Placement
     look: Row
-    plans: Mapping[Condition, Row]
-    conditions: tuple[Condition, ...]
+    plans: Mapping[PlacementCondition, Row]
+    conditions: tuple[PlacementCondition, ...]
 
     @property
     def coarse(self) -> float:

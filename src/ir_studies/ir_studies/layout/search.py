@@ -41,7 +41,7 @@ Made = Callable[[list[Job], str, str], None]
 """Makes jobs whose rows are missing: the jobs, the phase, and the best so far in words."""
 
 
-class Search:
+class LayoutSearch:
     """rows: by the keys of jobs; made: makes those that are missing."""
 
     def __init__(self, settings: LayoutSettings, rows: dict[str, Row], made: Made) -> None:

@@ -16,7 +16,7 @@ from ir_studies.errors import SettingsError
 from ir_studies.layout.placement import (
     JOINTS,
     TURNS,
-    Condition,
+    PlacementCondition,
     Placing,
     Range,
     Variable,
@@ -133,12 +133,12 @@ class LayoutSettings:
         return variables({**groups, **machines})
 
     @property
-    def conditions(self) -> tuple[Condition, ...]:
+    def conditions(self) -> tuple[PlacementCondition, ...]:
         """All cycle times with all masses."""
         masses = product(*self.payloads.values())  # few: _check_conditions counts them first
         payloads = [tuple(zip(self.payloads, one, strict=True)) for one in masses]
         return tuple(
-            Condition(cycle, payload) for payload in payloads for cycle in self.cycle_times
+            PlacementCondition(cycle, payload) for payload in payloads for cycle in self.cycle_times
         )
 
     @property
@@ -296,4 +296,11 @@ def _cell(name: str) -> Cell:
         raise SettingsError(f"cell: {error}") from error
 
 
-__all__ = ["EXAMPLE", "FORMAT", "Condition", "LayoutSettings", "layout_settings", "read_layout"]
+__all__ = [
+    "EXAMPLE",
+    "FORMAT",
+    "LayoutSettings",
+    "PlacementCondition",
+    "layout_settings",
+    "read_layout",
+]

@@ -10,10 +10,10 @@ from pathlib import Path
 from ir_description import cell_to_yaml, load_cell
 from ir_studies.layout.page import write_outputs
 from ir_studies.layout.placement import Known
-from ir_studies.layout.search import Search
+from ir_studies.layout.search import LayoutSearch
 from ir_studies.layout.settings import LayoutSettings
 from ir_studies.layout.summary import Final, final_jobs, finals, sentences
-from ir_studies.work import Job, Means, Results, Task
+from ir_studies.work import Job, Means, Results, StudyJob
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ def run_layout(settings: LayoutSettings, folder: str | Path, means: Means | None
     into = Path(folder)
     cell = load_cell(settings.cell)
     content = cell_to_yaml(cell)
-    task = Task("layout", {"cell_yaml": content, **settings.budget}, settings.hang_after)
+    task = StudyJob("layout", {"cell_yaml": content, **settings.budget}, settings.hang_after)
     cells = {cell.name: sha256(content.encode()).hexdigest()}
     with Results(into, "layout", settings.budget, cells) as results:
         with means.makers(task) as makers:
@@ -59,7 +59,7 @@ def run_layout(settings: LayoutSettings, folder: str | Path, means: Means | None
                     done += 1
                     means.progress(phase, done, len(jobs), best)
 
-            known = Search(settings, results.rows, made).run()
+            known = LayoutSearch(settings, results.rows, made).run()
             made(final_jobs(known, settings), "error bars of the best", "")
         best = finals(known, settings, results.rows)
         remark = results.remark

@@ -13,7 +13,7 @@ from ir_planner.checks import JouleInterval, interval
 from ir_recorder.report.number_text import kilowatt_hours, percent, seconds, span_of
 from ir_studies.layout.placement import FIRST_SEED, Known, Placement
 from ir_studies.layout.search import BATCH, GIVEN, best_of
-from ir_studies.layout.settings import Condition, LayoutSettings
+from ir_studies.layout.settings import LayoutSettings, PlacementCondition
 from ir_studies.work import Job, Row
 
 # Error bars: seeds, and what is not known of the robot. The interval of a saving is that of the
@@ -27,7 +27,7 @@ class Final:
     """
 
     placement: Placement
-    condition: Condition
+    condition: PlacementCondition
     rows: tuple[Row, ...]
 
     @property
@@ -91,7 +91,7 @@ def finals(
     """Of each finalist one per condition: the given placement first, then by their mean cost."""
     found = []
     for placement in finalists(known, settings):
-        by: dict[Condition, list[Row]] = {}
+        by: dict[PlacementCondition, list[Row]] = {}
         for condition, job in _jobs(placement, settings):
             by.setdefault(condition, []).append(rows[job.key])
         found.append(
@@ -109,7 +109,9 @@ def mean_cost(own: Sequence[Final]) -> float:
     return float(np.mean([one.mean("cost_j") for one in own]))
 
 
-def _jobs(placement: Placement, settings: LayoutSettings) -> Iterator[tuple[Condition, Job]]:
+def _jobs(
+    placement: Placement, settings: LayoutSettings
+) -> Iterator[tuple[PlacementCondition, Job]]:
     for condition in settings.conditions:
         for seed in range(FIRST_SEED, FIRST_SEED + settings.seeds):
             yield condition, placement.plan(condition, seed, robots=seed == FIRST_SEED)

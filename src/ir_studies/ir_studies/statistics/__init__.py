@@ -4,7 +4,13 @@ Time and energy with synchronous and asynchronous joints; predicted, measured di
 indirectly.
 """
 
-from ir_studies.statistics.runs import Finished, run_statistics
+from ir_studies.statistics.runs import FinishedStatistics, run_statistics
 from ir_studies.statistics.settings import EXAMPLE, StatisticsSettings, statistics_settings
 
-__all__ = ["EXAMPLE", "Finished", "StatisticsSettings", "run_statistics", "statistics_settings"]
+__all__ = [
+    "EXAMPLE",
+    "FinishedStatistics",
+    "StatisticsSettings",
+    "run_statistics",
+    "statistics_settings",
+]

@@ -57,7 +57,7 @@ _FIGURES = re.compile(
 
 
 @dataclass(frozen=True)
-class Failure:
+class PairFailure:
     """what: NO_PAIR or NOT_DRIVEN; how many for the same reason, and one of them in words."""
 
     what: str
@@ -65,12 +65,12 @@ class Failure:
     example: str
 
 
-def failures_of(rows: Sequence[Row]) -> tuple[Failure, ...]:
+def failures_of(rows: Sequence[Row]) -> tuple[PairFailure, ...]:
     """All reasons, the most frequent first."""
     found: dict[tuple[str, str], list[str]] = {}
     for what, words in [*_unsolved(rows), *_not_driven(rows)]:
         found.setdefault((what, _FIGURES.sub("", words)), []).append(words)
-    kept = [Failure(what, len(each), each[0]) for (what, _), each in found.items()]
+    kept = [PairFailure(what, len(each), each[0]) for (what, _), each in found.items()]
     return tuple(sorted(kept, key=lambda each: -each.count))
 
 
@@ -170,7 +170,7 @@ class Findings:
     agreements: tuple[Comparison, ...]
     covered: float
     driven: int
-    failures: tuple[Failure, ...] = ()
+    failures: tuple[PairFailure, ...] = ()
 
 
 def findings_of(rows: Sequence[Row]) -> Findings:

@@ -35,7 +35,7 @@ SHARE_OF_ENDS = 0.8
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class NamedPlace:
     """A named place, its configurations (K, n) and what each keeps (K,) [m] to the nearest body."""
 
     name: str
@@ -44,7 +44,7 @@ class Place:
 
 
 @dataclass(frozen=True, eq=False)
-class Pair:
+class EndPair:
     """From start to goal (n,), with their names; margin [m]: the safety distance that both ends
     allow.
     """
@@ -55,7 +55,7 @@ class Pair:
     margin: float
 
 
-def places_of(planner: Planner, load: str) -> tuple[Place, ...]:
+def places_of(planner: Planner, load: str) -> tuple[NamedPlace, ...]:
     """All places that keep NEAREST. StudyError where there are fewer than two."""
     cell = planner.cell
     named = {"home": np.array(cell.machine_home)[None]}
@@ -87,14 +87,16 @@ def read_by(settings: StatisticsSettings) -> dict[str, str]:
     return {settings.cell: cell_hash(cell), f"{PLANT}{settings.plant}": plant_hash(plant), **tasks}
 
 
-def _free(planner: Planner, name: str, q: FloatArray, load: str) -> Place:
+def _free(planner: Planner, name: str, q: FloatArray, load: str) -> NamedPlace:
     scene = planner.scene(load)
     clearance = scene.collision.min_distance(q).distance if len(q) else np.zeros(0)
     kept = clearance >= NEAREST
-    return Place(name, q[kept], clearance[kept])
+    return NamedPlace(name, q[kept], clearance[kept])
 
 
-def pair_of(places: tuple[Place, ...], seed: int, number: int, safety_distance: float) -> Pair:
+def pair_of(
+    places: tuple[NamedPlace, ...], seed: int, number: int, safety_distance: float
+) -> EndPair:
     """Pair `number` of a seed: two different places, each in a configuration drawn for it."""
     rng = np.random.default_rng([seed, number])
     first, last = (places[k] for k in rng.choice(len(places), 2, replace=False))
@@ -102,7 +104,7 @@ def pair_of(places: tuple[Place, ...], seed: int, number: int, safety_distance: 
     j = int(rng.integers(len(last.q)))
     least = float(min(first.clearance[i], last.clearance[j]))
     margin = min(safety_distance, SHARE_OF_ENDS * least)
-    return Pair((first.name, last.name), first.q[i], last.q[j], margin)
+    return EndPair((first.name, last.name), first.q[i], last.q[j], margin)
 
 
 AROUND = 0.5  # s after a movement that the filter of the indirect measurement may look at
@@ -138,7 +140,7 @@ def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
     return row_of
 
 
-def one_timing(pair: Pair, timing: str, asked: StatisticsSettings, planner: Planner) -> Row:
+def one_timing(pair: EndPair, timing: str, asked: StatisticsSettings, planner: Planner) -> Row:
     """Figures of the movement with one timing; `solved` false, with a sentence, where there is
     none.
     """

@@ -10,11 +10,11 @@ from ir_studies.statistics.findings import Findings, findings_of, solved
 from ir_studies.statistics.movements import read_by
 from ir_studies.statistics.outputs import summary_of, summed_up, write_outputs
 from ir_studies.statistics.settings import StatisticsSettings
-from ir_studies.work import Job, Means, Results, Row, Task
+from ir_studies.work import Job, Means, Results, Row, StudyJob
 
 
 @dataclass(frozen=True)
-class Finished:
+class FinishedStatistics:
     """Rows of all pairs in their order, what they say together, and the files that were written."""
 
     settings: StatisticsSettings
@@ -37,14 +37,14 @@ class Finished:
 
 def run_statistics(
     settings: StatisticsSettings, folder: str | Path, means: Means | None = None
-) -> Finished:
+) -> FinishedStatistics:
     """Make the pairs that the folder has no row of; interrupted, it goes on where it ended.
     StudyError.
     """
     means = means or Means()
     jobs = {str(number): Job(str(number), {"number": number}) for number in range(settings.pairs)}
     read = read_by(settings)
-    task = Task("statistics", {**asdict(settings), "read": read}, settings.hang_after)
+    task = StudyJob("statistics", {**asdict(settings), "read": read}, settings.hang_after)
     with Results(Path(folder), "statistics", settings.budget, read) as results:
         missing = [job for key, job in jobs.items() if key not in results.rows]
         done = len(jobs) - len(missing)
@@ -57,7 +57,7 @@ def run_statistics(
         remark = results.remark
     found = findings_of(rows)
     files = write_outputs(rows, found, settings, Path(folder))
-    return Finished(settings, rows, found, files, remark)
+    return FinishedStatistics(settings, rows, found, files, remark)
 
 
 def _words(row: Row) -> str:

@@ -1,6 +1,6 @@
 """Work of all studies: jobs in worker processes, results in a growing file, settings files."""
 
-from ir_studies.work.job import Job, Row, Task
+from ir_studies.work.job import Job, Row, StudyJob
 from ir_studies.work.means import MOST_WORKERS, Means
 from ir_studies.work.results import Results
 from ir_studies.work.settings_file import (
@@ -20,7 +20,7 @@ __all__ = [
     "Placed",
     "Results",
     "Row",
-    "Task",
+    "StudyJob",
     "beside",
     "checked_known",
     "checked_number",

@@ -23,7 +23,7 @@ from uuid import uuid4
 
 from ir_studies.errors import StoppedError, StudyError, WorkerError
 from ir_studies.work.fingerprint import computed_with
-from ir_studies.work.job import Job, Row, Task
+from ir_studies.work.job import Job, Row, StudyJob
 from ir_studies.work.pool import Pool
 
 # In a worker of the cluster: the processes that make its jobs, one for each thread and study. A
@@ -154,7 +154,7 @@ class _Turn:
 class Cluster:
     """Makes jobs by the workers of a scheduler; `stopped` as in Pool."""
 
-    def __init__(self, task: Task, address: str, stopped: Stopped | None = None) -> None:
+    def __init__(self, task: StudyJob, address: str, stopped: Stopped | None = None) -> None:
         """Connect. WorkerError where Dask is missing, nobody answers, or no worker is there."""
         self._dask = _distributed()
         self._stopped = stopped
@@ -316,7 +316,7 @@ def made(study: str, task: str, words: Mapping[str, Any], build: str) -> Row:
     """In a worker of the cluster: the row of a job. WorkerError where it would compute other
     bits.
     """
-    read: Task = Task(**json.loads(task))
+    read: StudyJob = StudyJob(**json.loads(task))
     if computed_with(read.kind) != build:
         raise WorkerError(
             f"a worker of the cluster computes with {computed_with(read.kind)}, not with {build}"

@@ -13,7 +13,7 @@ REFUSED = "refused"
 
 
 @dataclass(frozen=True)
-class Task:
+class StudyJob:
     """What every job of a study has in common.
 
     kind: which module of MAKERS (worker.py) makes the jobs; settings: what it is given before the

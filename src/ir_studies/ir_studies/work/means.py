@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ir_studies.errors import StudyError, WorkerError
-from ir_studies.work.job import Job, Row, Task
+from ir_studies.work.job import Job, Row, StudyJob
 from ir_studies.work.pool import COMMAND, Pool
 
 MOST_WORKERS = 64
@@ -54,7 +54,7 @@ class Means:
         if self.scheduler:
             _check_address(self.scheduler)
 
-    def makers(self, task: Task) -> AbstractContextManager[Makers]:
+    def makers(self, task: StudyJob) -> AbstractContextManager[Makers]:
         """Processes that make the jobs of a task; they end with the context."""
         if self.scheduler:
             from ir_studies.work.cluster import Cluster

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from types import TracebackType
 
 from ir_studies.errors import StoppedError, WorkerError
-from ir_studies.work.job import REFUSED, Job, Row, Task
+from ir_studies.work.job import REFUSED, Job, Row, StudyJob
 from ir_studies.work.lifeline import VARIABLE
 
 COMMAND = (sys.executable, "-m", "ir_studies.work.worker")
@@ -38,7 +38,7 @@ class _Turn:
 class _Worker:
     """One process, and the job that it makes. It ends with this process, whatever it does then."""
 
-    def __init__(self, command: Sequence[str], task: Task) -> None:
+    def __init__(self, command: Sequence[str], task: StudyJob) -> None:
         pipe = (
             subprocess.PIPE
         )  # a group of its own: Ctrl-C is for the study, which ends its workers
@@ -107,7 +107,7 @@ class Pool:
 
     def __init__(
         self,
-        task: Task,
+        task: StudyJob,
         count: int,
         command: Sequence[str] = COMMAND,
         stopped: Callable[[], bool] | None = None,

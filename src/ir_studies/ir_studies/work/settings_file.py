@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 from ir_studies.errors import SettingsError
 from ir_values.errors import DescriptionFileError, unknown_name
-from ir_values.yaml_tree import Limits, plain_values
+from ir_values.yaml_tree import YamlLimits, plain_values
 
 MOST_CHARACTERS = 1_000_000  # of a settings file
 Bounds: TypeAlias = "tuple[str, float, float]"
@@ -71,7 +71,7 @@ def kind_of(content: str) -> str:
 def _mapping(content: str) -> dict[Any, Any] | None:
     """What a text holds; None where it is no mapping."""
     try:
-        read = plain_values(content, "", Limits(characters=MOST_CHARACTERS))
+        read = plain_values(content, "", YamlLimits(characters=MOST_CHARACTERS))
     except DescriptionFileError as error:
         place = f"line {error.line}: " if error.line else ""
         raise SettingsError(f"{place}{error.sentence}") from error
