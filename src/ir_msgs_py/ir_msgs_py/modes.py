@@ -228,8 +228,9 @@ class PowerState:
             set_field(self, name, read_only(getattr(self, name), name, (None,)))
 
 
-# Times into and out of the power modes, and the shortest stay in each. Planner, driver and program
-# runner have one parameter for each, under the same name: PREFIX and the field's.
+# Times into and out of the power modes, and the shortest stay in each: parameters of the driver,
+# which reports them. Planner and program runner have parameters of the same names, PREFIX and the
+# field's, for the time in which no driver reports.
 
 PREFIX = "transitions."  # of the parameters
 _WEEK = 604_800.0
