@@ -211,13 +211,11 @@ class Asked:
         known.take(np.array(HOME), 0.0)
         self.logged: list[str] = []
         self.requests = Requests(
-            self.planner,
-            known,
-            lambda: 0.0,
-            lambda: None,
-            lambda _: None,
-            lambda: 1,
-            self.logged.append,
+            planner=self.planner,
+            last_state=known,
+            now=lambda: 0.0,
+            draw_seed=lambda: 1,
+            log=self.logged.append,
         )
 
     def answer(self, name: str, request: Any) -> Any:

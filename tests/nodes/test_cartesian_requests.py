@@ -36,7 +36,11 @@ def requests() -> Requests:
     planner = Planner(clock=lambda: 0.0)
     planner.set_cell(text=cell_to_yaml(load_cell("open")) + SEAM)
     return Requests(
-        planner, LastState(), time.monotonic, lambda: None, lambda _: None, lambda: 7, print
+        planner=planner,
+        last_state=LastState(),
+        now=time.monotonic,
+        draw_seed=lambda: 7,
+        log=print,
     )
 
 
@@ -164,7 +168,11 @@ def test_t1_keeps_250_mm_per_second(requests: Requests) -> None:
 def test_what_a_path_of_the_cell_allows_to_touch_holds_for_it_alone() -> None:
     planner = Planner("kr6_bench", clock=lambda: 0.0)
     own = Requests(
-        planner, LastState(), time.monotonic, lambda: None, lambda _: None, lambda: 7, print
+        planner=planner,
+        last_state=LastState(),
+        now=time.monotonic,
+        draw_seed=lambda: 7,
+        log=print,
     )
     found = answer(own, PlanCartesianMovement.Request(path="bead"))
     assert found.status.code == StatusCode.SUCCESS, found.status.message
@@ -176,7 +184,11 @@ def test_what_a_path_of_the_cell_allows_to_touch_holds_for_it_alone() -> None:
 def test_a_program_drives_a_path_that_is_named_as_a_stop() -> None:
     planner = Planner("kr6_bench", clock=lambda: 0.0)
     own = Requests(
-        planner, LastState(), time.monotonic, lambda: None, lambda _: None, lambda: 7, print
+        planner=planner,
+        last_state=LastState(),
+        now=time.monotonic,
+        draw_seed=lambda: 7,
+        log=print,
     )
     request = PlanProgram.Request(stations=["bead"])
     found = own.guarded(own.plan_program)(request, PlanProgram.Response())

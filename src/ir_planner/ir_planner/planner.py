@@ -575,16 +575,16 @@ class Planner:
             "park" if start is None else start, "start", StatusCode.START_STATE_INVALID
         )
         request = ProgramRequest(
-            cell,
-            self._current.power(cell),
-            tuple(stations),
-            begin,
-            options,
-            bounded(cycle_time, 0.0, 604_800.0, "cycle_time", "s"),
-            replace(self.settings, transitions=self.heard.transitions),
-            savings,
-            front_points,
-            self.heard.doors(cell),
+            cell=cell,
+            power=self._current.power(cell),
+            stations=tuple(stations),
+            start=begin,
+            options=options,
+            cycle_time=bounded(cycle_time, 0.0, 604_800.0, "cycle_time", "s"),
+            settings=replace(self.settings, transitions=self.heard.transitions),
+            savings=savings,
+            front_points=front_points,
+            doors=self.heard.doors(cell),
         )
         spreads = Spreads(request)
         stops = max(len(stations or cell.program), 1)  # the ceilings are those of one movement
@@ -649,11 +649,11 @@ class Planner:
     ) -> tuple[ProgramRequest, Work]:
         cell = self.cell
         request = ProgramRequest(
-            cell,
-            self._current.power(cell),
-            (),
-            cell.park,
-            options,
+            cell=cell,
+            power=self._current.power(cell),
+            stations=(),
+            start=cell.park,
+            options=options,
             settings=replace(self.settings, transitions=self.heard.transitions),
             doors=self.heard.doors(cell),
         )

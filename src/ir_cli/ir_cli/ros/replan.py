@@ -338,13 +338,11 @@ def _again(planner: Planner, call: Call, states: list[tuple[int, bytes]]) -> Rep
     seed = int(call.response.info.seed)
     state = LastState(q=_start(planner, call, states))
     requests = Requests(
-        planner,
-        state,
-        lambda: _FREE,
-        lambda: None,
-        lambda planned: None,
-        lambda: seed,
-        problems.append,
+        planner=planner,
+        last_state=state,
+        now=lambda: _FREE,
+        draw_seed=lambda: seed,
+        log=problems.append,
     )
     answer = type(call.response)()
     requests.guarded(getattr(requests, HANDLERS[call.type]))(call.request, answer)

@@ -99,15 +99,15 @@ class PlannerNode(Node):
             self._look, lambda: self.count_publishers(names.JOINT_STATES) > 0
         )
         self._requests = Requests(
-            self.planner,
-            self._last_state,
-            time.monotonic,
-            self._show_cell,
-            self._show_movement,
-            lambda: random.SystemRandom().getrandbits(64),
-            self.get_logger().error,
-            self._show_service,
-            self._show_savings,
+            planner=self.planner,
+            last_state=self._last_state,
+            now=time.monotonic,
+            cell_changed=self._show_cell,
+            planned=self._show_movement,
+            draw_seed=lambda: random.SystemRandom().getrandbits(64),
+            log=self.get_logger().error,
+            service_planned=self._show_service,
+            program_saves=self._show_savings,
         )
         self._trajectories = self.create_publisher(
             JointTrajectoryMsg, own(names.PLANNED_TRAJECTORY), LATCHED

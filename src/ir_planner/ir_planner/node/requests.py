@@ -10,6 +10,27 @@ import numpy as np
 
 from ir_description import DescriptionError, UnknownNameError, cell_to_yaml, is_path, robot_urdf
 from ir_kernels import KernelError
+from ir_msgs.srv import (
+    CheckState,
+    CheckStates,
+    ComputeIk,
+    EvaluateTrajectory,
+    ExportProgram,
+    GetCell,
+    GetProgram,
+    GetTrajectory,
+    OptimizeTrajectory,
+    PlanCartesianMovement,
+    PlanEscape,
+    PlanProgram,
+    PlanRegionalMovement,
+    PlanServiceMovement,
+    PlanStandby,
+    PlanSteadyCycle,
+    PlanTrajectory,
+    SetCell,
+    SetEquipment,
+)
 from ir_msgs_py.names import PLANNER
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.search_conversions import searches_to_msg
@@ -93,13 +114,14 @@ class Requests:
 
     def __init__(
         self,
+        *,
         planner: Planner,
         last_state: LastState,
         now: Callable[[], float],
-        cell_changed: Callable[[], None],
-        planned: Callable[[JointTrajectory], None],
         draw_seed: Callable[[], int],
         log: Callable[[str], None],
+        cell_changed: Callable[[], None] = lambda: None,
+        planned: Callable[[JointTrajectory], None] = lambda trajectory: None,
         service_planned: Callable[[str, ServicePlan], None] = lambda station, plan: None,
         program_saves: Callable[[ProgramSavings], None] = lambda savings: None,
     ) -> None:
@@ -126,7 +148,7 @@ class Requests:
 
         return callback
 
-    def set_cell(self, request: Any, response: Any) -> Status:
+    def set_cell(self, request: SetCell.Request, response: SetCell.Response) -> Status:
         """Another cell; a file must lie below the roots, whatever the request says."""
         file = request.cell_file
         if is_path(file):
@@ -137,7 +159,7 @@ class Requests:
         self.cell_changed()
         return Status.success()
 
-    def get_cell(self, request: Any, response: Any) -> Status:
+    def get_cell(self, request: GetCell.Request, response: GetCell.Response) -> Status:
         """The cell as it stands."""
         cell = self.planner.cell
         response.cell_yaml = cell_to_yaml(cell)
@@ -145,7 +167,9 @@ class Requests:
         response.robot_description = robot_urdf(cell.robot, cell.tool, cell.tcp, cell.base_pose)
         return Status.success()
 
-    def set_equipment(self, request: Any, response: Any) -> Status:
+    def set_equipment(
+        self, request: SetEquipment.Request, response: SetEquipment.Response
+    ) -> Status:
         """A machine moved, switched or in another state."""
         pose = pose_of(request.pose, self.planner.cell)
         self.planner.set_equipment(
@@ -154,7 +178,7 @@ class Requests:
         self.cell_changed()
         return Status.success()
 
-    def check_state(self, request: Any, response: Any) -> Status:
+    def check_state(self, request: CheckState.Request, response: CheckState.Response) -> Status:
         """Is this state free."""
         q = self._state(request.state, StatusCode.INVALID_ROBOT_STATE)
         margin = request.safety_distance
@@ -169,7 +193,7 @@ class Requests:
         fill_state_check(response, check)
         return check.status
 
-    def check_states(self, request: Any, response: Any) -> Status:
+    def check_states(self, request: CheckStates.Request, response: CheckStates.Response) -> Status:
         """Are these states free."""
         q = states_of(request.states, self.planner.cell)
         check = self.planner.check_states(
@@ -179,7 +203,7 @@ class Requests:
         blocked = int((~check.valid).sum())
         return Status.success(f"{blocked} of {len(q)} states are not free" if blocked else "")
 
-    def compute_ik(self, request: Any, response: Any) -> Status:
+    def compute_ik(self, request: ComputeIk.Request, response: ComputeIk.Response) -> Status:
         """Configurations that reach a pose."""
         cell = self.planner.cell
         near = state_of(request.near, cell, StatusCode.INVALID_ROBOT_STATE)
@@ -198,7 +222,12 @@ class Requests:
         fill_ik(response, answer)
         return answer.status
 
-    def plan_regional(self, request: Any, response: Any, cancelled: Gone = _NEVER) -> Status:
+    def plan_regional(
+        self,
+        request: PlanRegionalMovement.Request,
+        response: PlanRegionalMovement.Response,
+        cancelled: Gone = _NEVER,
+    ) -> Status:
         """From machine to machine."""
         cell = self.planner.cell
         options = options_of(request.options, self.draw_seed)
@@ -229,7 +258,9 @@ class Requests:
         response.searches = searches_to_msg(plan.info.searches)
         return self._movement(plan, response, options.include_points)
 
-    def plan_escape(self, request: Any, response: Any, cancelled: Gone = _NEVER) -> Status:
+    def plan_escape(
+        self, request: PlanEscape.Request, response: PlanEscape.Response, cancelled: Gone = _NEVER
+    ) -> Status:
         """Away from what is too near, and back within the limits."""
         options = options_of(request.options, self.draw_seed)
         start = self._state(request.start, StatusCode.START_STATE_INVALID, at_rest="start")
@@ -239,7 +270,12 @@ class Requests:
         fill_escape(response, plan, options.include_points)
         return self._shown(plan)
 
-    def plan_service(self, request: Any, response: Any, cancelled: Gone = _NEVER) -> Status:
+    def plan_service(
+        self,
+        request: PlanServiceMovement.Request,
+        response: PlanServiceMovement.Response,
+        cancelled: Gone = _NEVER,
+    ) -> Status:
         """Out of a machine's work area, or into it."""
         options = options_of(request.options, self.draw_seed)
         cell = self.planner.cell
@@ -260,7 +296,12 @@ class Requests:
             self.service_planned(request.station, plan)
         return plan.status
 
-    def plan_trajectory(self, request: Any, response: Any, cancelled: Gone = _NEVER) -> Status:
+    def plan_trajectory(
+        self,
+        request: PlanTrajectory.Request,
+        response: PlanTrajectory.Response,
+        cancelled: Gone = _NEVER,
+    ) -> Status:
         """Through given points."""
         options = options_of(request.options, self.draw_seed)
         reference = reference_of(request.reference, self.planner.cell)
@@ -270,7 +311,12 @@ class Requests:
             options.include_points,
         )
 
-    def plan_cartesian(self, request: Any, response: Any, cancelled: Gone = _NEVER) -> Status:
+    def plan_cartesian(
+        self,
+        request: PlanCartesianMovement.Request,
+        response: PlanCartesianMovement.Response,
+        cancelled: Gone = _NEVER,
+    ) -> Status:
         """The tool along a path."""
         options = options_of(request.options, self.draw_seed)
         cell = self.planner.cell
@@ -285,7 +331,12 @@ class Requests:
         fill_cartesian(response, plan, options.include_points)
         return self._shown(plan)
 
-    def optimize_trajectory(self, request: Any, response: Any, cancelled: Gone = _NEVER) -> Status:
+    def optimize_trajectory(
+        self,
+        request: OptimizeTrajectory.Request,
+        response: OptimizeTrajectory.Response,
+        cancelled: Gone = _NEVER,
+    ) -> Status:
         """The same end points for less."""
         options = options_of(request.options, self.draw_seed)
         plan = self.planner.optimize_trajectory(
@@ -306,12 +357,12 @@ class Requests:
 
     def plan_program(
         self,
-        request: Any,
-        response: Any,
+        request: PlanProgram.Request,
+        response: PlanProgram.Response,
         cancelled: Gone = _NEVER,
         progress: Callable[[str, int, int, float], None] = lambda phase, done, total, cost: None,
     ) -> Status:
-        """A whole program; also what the action does."""
+        """A whole program; the action asks it with its goal and result, which have these fields."""
         options = options_of(request.options, self.draw_seed)
         start = self._known_or_home(at_rest=True)
         plan: ProgramPlan = self.planner.plan_program(
@@ -332,7 +383,12 @@ class Requests:
                 self.planned(movement.trajectory)
         return plan.status
 
-    def plan_steady_cycle(self, request: Any, response: Any, cancelled: Gone = _NEVER) -> Status:
+    def plan_steady_cycle(
+        self,
+        request: PlanSteadyCycle.Request,
+        response: PlanSteadyCycle.Response,
+        cancelled: Gone = _NEVER,
+    ) -> Status:
         """The cheapest cycle of the cell's route."""
         options = options_of(request.options, self.draw_seed)
         plan = self.planner.plan_steady_cycle(
@@ -347,14 +403,16 @@ class Requests:
         fill_steady_cycle(response, plan, options.include_points)
         return plan.status
 
-    def get_program(self, request: Any, response: Any) -> Status:
+    def get_program(self, request: GetProgram.Request, response: GetProgram.Response) -> Status:
         """A program planned before."""
         fill_stored_program(
             response, self.planner.programs.get(request.program_id), request.include_points
         )
         return Status.success()
 
-    def export_program(self, request: Any, response: Any) -> Status:
+    def export_program(
+        self, request: ExportProgram.Request, response: ExportProgram.Response
+    ) -> Status:
         """A program or a trajectory planned before, as KRL."""
         chosen(request.language, ("krl",), "language")
         if bool(request.program_id) == bool(request.trajectory_id):
@@ -372,7 +430,9 @@ class Requests:
         fill_export(response, written)
         return Status.success(written.remark)
 
-    def evaluate_trajectory(self, request: Any, response: Any) -> Status:
+    def evaluate_trajectory(
+        self, request: EvaluateTrajectory.Request, response: EvaluateTrajectory.Response
+    ) -> Status:
         """What a trajectory costs and where it first breaks a bound."""
         trajectory = trajectory_of(request, self.planner)
         evaluation = self.planner.evaluate(
@@ -390,14 +450,16 @@ class Requests:
         fill_evaluation(response, evaluation)
         return evaluation.status
 
-    def get_trajectory(self, request: Any, response: Any) -> Status:
+    def get_trajectory(
+        self, request: GetTrajectory.Request, response: GetTrajectory.Response
+    ) -> Status:
         """The points of a trajectory planned before."""
         response.trajectory = trajectory_to_msg(
             self.planner.trajectories.get(request.trajectory_id)
         )
         return Status.success()
 
-    def plan_standby(self, request: Any, response: Any) -> Status:
+    def plan_standby(self, request: PlanStandby.Request, response: PlanStandby.Response) -> Status:
         """Where to rest during a pause."""
         q = state_of(request.state, self.planner.cell, StatusCode.INVALID_ROBOT_STATE)
         samples = np.array(request.pause_samples)
