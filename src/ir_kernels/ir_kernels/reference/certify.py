@@ -145,66 +145,116 @@ def capsule_bounds(
     return bound
 
 
-def certify(model: Geometry, motion: Motion, threshold: FloatArray) -> Outcome:  # noqa: PLR0915
+class _Intervals:
+    """Intervals [low, high] of the motions `rows` that are open still, the earliest first."""
+
+    def __init__(self, span: FloatArray) -> None:
+        self.rows: IntArray = np.arange(len(span))
+        self.low = np.zeros(len(span))
+        self.high = span.copy()
+
+    def take(self) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Remove the first FRONT of every motion: their rows and ends."""
+        turn = _rank(self.rows) < FRONT
+        taken = self.rows[turn], self.low[turn], self.high[turn]
+        self._keep(~turn)
+        return taken
+
+    def add(self, rows: IntArray, low: FloatArray, high: FloatArray) -> None:
+        """More of them."""
+        self.rows = np.concatenate([rows, self.rows])
+        self.low = np.concatenate([low, self.low])
+        self.high = np.concatenate([high, self.high])
+
+    def drop_after(self, ends: FloatArray) -> None:
+        """Drop what begins after the end (M,) of its motion, and sort the others."""
+        open_ = np.flatnonzero(self.low < ends[self.rows])
+        self._keep(open_[np.lexsort((self.low[open_], self.rows[open_]))])
+
+    def _keep(self, which: NDArray[np.bool_] | IntArray) -> None:
+        self.rows = self.rows[which]
+        self.low = self.low[which]
+        self.high = self.high[which]
+
+
+class _Earliest:
+    """The earliest collision (hit) and the earliest interval that stays undecided (stuck) of every
+    motion (M,), and the least proved distance above the thresholds.
+    """
+
+    def __init__(self, span: FloatArray) -> None:
+        self._span = span
+        self.hit_at = np.full(len(span), np.inf)
+        self._hit_pair = np.full(len(span), -1)
+        self._stuck_from = np.full(len(span), np.inf)
+        self._stuck_to = span.copy()
+        self._stuck_pair = np.full(len(span), -1)
+        self.bound = np.full(len(span), np.inf)
+
+    @property
+    def ends(self) -> FloatArray:
+        """Where (M,) a motion needs no further look."""
+        return np.minimum(self.hit_at, self._stuck_from)
+
+    def hit(self, row: int, time: float, pair: int) -> None:
+        """A collision."""
+        if time < self.hit_at[row]:
+            self.hit_at[row] = time
+            self._hit_pair[row] = pair
+
+    def stuck(self, row: int, low: float, high: float, pair: int) -> None:
+        """An interval that can't be decided."""
+        if low < self._stuck_from[row]:
+            self._stuck_from[row] = low
+            self._stuck_to[row] = high
+            self._stuck_pair[row] = pair
+
+    def outcome(self) -> Outcome:
+        """What was found, once nothing is open."""
+        collides = np.isfinite(self.hit_at)
+        doubt = np.isfinite(self._stuck_from)
+        verdict = np.where(collides, COLLIDES, np.where(doubt, UNDECIDED, FREE)).astype(np.uint8)
+        t1 = np.where(collides, self.hit_at, np.where(doubt, self._stuck_to, self._span))
+        pair = np.where(collides, self._hit_pair, self._stuck_pair)
+        return Outcome(verdict, np.minimum(self._stuck_from, t1), t1, pair, self.bound)
+
+
+def certify(model: Geometry, motion: Motion, threshold: FloatArray) -> Outcome:
     """Outcome for every motion; thresholds (Z,) in m, -inf ignores a pair."""
     span = motion.span()
-    hit_at = np.full(len(span), np.inf)
-    hit_pair = np.full(len(span), -1)
-    stuck_from = np.full(len(span), np.inf)
-    stuck_to = span.copy()
-    stuck_pair = np.full(len(span), -1)
-    bound = np.full(len(span), np.inf)
-    rows = np.arange(len(span))
-    low = np.zeros(len(span))
-    high = span.copy()
-    while len(rows) and len(threshold):
-        turn = _rank(rows) < FRONT
-        now = rows[turn]
-        a = low[turn]
-        b = high[turn]
-        middle = (a + b) / 2.0
-        poses = collision.poses(model, motion.at(now, middle))
+    found = _Earliest(span)
+    intervals = _Intervals(span)
+    while len(intervals.rows) and len(threshold):
+        rows, low, high = intervals.take()
+        middle = (low + high) / 2.0
+        poses = collision.poses(model, motion.at(rows, middle))
         segments = collision.ends(model, poses)
         above = collision.distances(model, segments) - threshold
-        moved = (
-            motion_bounds(model, poses, segments, motion.spread(now, middle, (b - a) / 2.0))
-            + MARGIN
-        )
-        index = np.arange(len(now))
+        spread = motion.spread(rows, middle, (high - low) / 2.0)
+        moved = motion_bounds(model, poses, segments, spread) + MARGIN
+
+        each = np.arange(len(rows))
         nearest = above.argmin(axis=1)
         doubtful = (above - moved).argmin(axis=1)
-        proved = (above - moved)[index, doubtful]
-        hit = above[index, nearest] <= -MARGIN
+        proved = (above - moved)[each, doubtful]
+        hit = above[each, nearest] <= -MARGIN
         free = proved > 0.0
-        np.minimum.at(bound, now[free], proved[free])
+        np.minimum.at(found.bound, rows[free], proved[free])
         for k in np.flatnonzero(hit):
-            if middle[k] < hit_at[now[k]]:
-                hit_at[now[k]] = middle[k]
-                hit_pair[now[k]] = nearest[k]
-        located = np.isfinite(hit_at[now]) & (b - a < LOCATE * span[now])
-        stuck = ~free & (located | (~hit & (moved[index, doubtful] < RESOLUTION)))
+            found.hit(rows[k], middle[k], nearest[k])
+
+        located = np.isfinite(found.hit_at[rows]) & (high - low < LOCATE * span[rows])
+        stuck = ~free & (located | (~hit & (moved[each, doubtful] < RESOLUTION)))
         for k in np.flatnonzero(stuck):
-            if a[k] < stuck_from[now[k]]:
-                stuck_from[now[k]] = a[k]
-                stuck_to[now[k]] = b[k]
-                stuck_pair[now[k]] = doubtful[k]
-        before = hit & ~stuck
+            found.stuck(rows[k], low[k], high[k], doubtful[k])
+
+        before = hit & ~stuck  # an earlier collision may lie before the middle
         split = ~free & ~hit & ~stuck
-        rows = np.concatenate([now[before], now[split], now[split], rows[~turn]])
-        high = np.concatenate([middle[before], middle[split], b[split], high[~turn]])
-        low = np.concatenate([a[before], a[split], middle[split], low[~turn]])
-        open_ = np.flatnonzero(low < np.minimum(hit_at, stuck_from)[rows])
-        order = open_[np.lexsort((low[open_], rows[open_]))]
-        rows = rows[order]
-        low = low[order]
-        high = high[order]
-    collides = np.isfinite(hit_at)
-    doubt = np.isfinite(stuck_from)
-    verdict = np.where(collides, COLLIDES, np.where(doubt, UNDECIDED, FREE)).astype(np.uint8)
-    t1 = np.where(collides, hit_at, np.where(doubt, stuck_to, span))
-    return Outcome(
-        verdict, np.minimum(stuck_from, t1), t1, np.where(collides, hit_pair, stuck_pair), bound
-    )
+        intervals.add(rows[split], middle[split], high[split])
+        intervals.add(rows[split], low[split], middle[split])
+        intervals.add(rows[before], low[before], middle[before])
+        intervals.drop_after(found.ends)
+    return found.outcome()
 
 
 def _rank(rows: IntArray) -> IntArray:

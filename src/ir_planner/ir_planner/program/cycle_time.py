@@ -160,6 +160,11 @@ def _above(cost: float, bound: float) -> float:
 
 # Which chain of configurations and which movements fill a cycle time with the least energy at the
 # mains.
+#
+# The values of a second that movements are known for form a ladder (movement_fronts); a rung is one
+# of them, FASTEST the one where time alone counts. The rung that a chain needs for a cycle says
+# what a second is worth there; another chain may be the cheapest at that value. standing: seconds
+# of the program's pauses, which no choice changes.
 
 _ROUNDING = 1e-6  # s: durations are whole nanoseconds, stretched by millionths
 # rungs from the request's own value, over which its chain is taken to stay the best
@@ -202,7 +207,7 @@ class TimedChoice:
         return self.cycle_time if self.timed.wait > 0.0 else 0.0
 
 
-def timed_choice(  # noqa: C901
+def timed_choice(
     choice: Choice, cycle_time: float, standing: float, progress: Progress
 ) -> TimedChoice:
     """The cheapest movements for a cycle [s] of which `standing` s are pauses. Candidates are the
@@ -212,42 +217,58 @@ def timed_choice(  # noqa: C901
     work could find faster ones.
     """
     seconds = cycle_time - standing + _ROUNDING
-    first = _tried(choice, seconds, standing, None)
-    rates = rates_of(choice.movements.context)
-    rung = first.rung
-    bound = 0.0
-    if rates.joule and choice.movements.context.options.objective != "movement_cost":
-        bound = first.bound(choice.chain, rates.second, seconds)
-    if first.timed is not None and rung == FASTEST:
-        rung = (
-            FASTEST - 1
-        )  # the chain that is fastest of all is not needed, and says nothing of joules
-    other = None
-    if abs(rung - choice.ladder.first) > _SAME_CHAIN:
-        other = _cheapest_at(rung, choice, progress)
-    best = first
-    if other is not None:
-        if other.chain.chosen != choice.chain.chosen:
-            second = _tried(other, seconds, standing, rung)
-            best = second if second.energy < first.energy else first
-        if rung != FASTEST:
-            bound = max(bound, best.bound(other.chain, choice.ladder.rates(rung).second, seconds))
+    best, bound = _cheaper_chain(choice, seconds, standing, progress)
     if best.timed is None:
         best = _fastest(best, seconds, standing, progress)
     if best.timed is None:
-        work = choice.movements.context.work
-        shortest = best.values.shortest
-        if work.exhausted:
-            raise StageError(Status(StatusCode.PLANNING_FAILED, _CUT.format(cycle_time)))
-        if work.left < work.improvement:  # the last movements had less than they can use
-            little = _LITTLE.format(cycle_time, shortest + standing)
-            raise StageError(Status(StatusCode.PLANNING_FAILED, little))
-        raise RequestError(
-            StatusCode.INVALID_GOAL_CONSTRAINTS,
-            f"cycle_time is {cycle_time:g} s: the shortest is {shortest + standing:.3f} s, "
-            f"of which {standing:.3f} s are pauses",
-        )
+        raise _too_short(best, cycle_time, standing)
     return TimedChoice(best.choice, best.timed, cycle_time, bound)
+
+
+def _cheaper_chain(
+    choice: Choice, seconds: float, standing: float, progress: Progress
+) -> tuple["_Tried", float]:
+    """The cheaper of the given chain and of the one that is cheapest at the rung that the given one
+    needs; and the bound of energy [J] that the cheapest chain at either value gives.
+    """
+    first = _tried(choice, seconds, standing, None)
+    rates = rates_of(choice.movements.context)
+    bound = 0.0
+    if rates.joule and choice.movements.context.options.objective != "movement_cost":
+        bound = first.bound(choice.chain, rates.second, seconds)
+
+    rung = first.rung
+    if first.timed is not None and rung == FASTEST:
+        rung -= 1  # the chain that is fastest of all is not needed, and says nothing of joules
+    if abs(rung - choice.ladder.first) <= _SAME_CHAIN:
+        return first, bound
+    other = _cheapest_at(rung, choice, progress)
+    if other is None:
+        return first, bound
+
+    best = first
+    if other.chain.chosen != choice.chain.chosen:
+        second = _tried(other, seconds, standing, rung)
+        best = second if second.energy < first.energy else first
+    if rung != FASTEST:
+        bound = max(bound, best.bound(other.chain, choice.ladder.rates(rung).second, seconds))
+    return best, bound
+
+
+def _too_short(best: "_Tried", cycle_time: float, standing: float) -> StageError | RequestError:
+    """Why no program fits the cycle: the work ended, or nothing is as fast."""
+    work = best.choice.movements.context.work
+    shortest = best.values.shortest + standing
+    if work.exhausted:
+        return StageError(Status(StatusCode.PLANNING_FAILED, _CUT.format(cycle_time)))
+    if work.left < work.improvement:  # the last movements had less than they can use
+        little = _LITTLE.format(cycle_time, shortest)
+        return StageError(Status(StatusCode.PLANNING_FAILED, little))
+    return RequestError(
+        StatusCode.INVALID_GOAL_CONSTRAINTS,
+        f"cycle_time is {cycle_time:g} s: the shortest is {shortest:.3f} s, "
+        f"of which {standing:.3f} s are pauses",
+    )
 
 
 @dataclass(frozen=True, eq=False)
