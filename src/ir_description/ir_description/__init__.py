@@ -65,7 +65,6 @@ from ir_description.library import (
 )
 from ir_description.robot import (
     AXIS_UNITS,
-    CENTRES,
     DATA_SHEET,
     IDLE,
     IDLE_WATTS,
@@ -91,7 +90,6 @@ from ir_description.robot import (
     moving_frames,
     parameter_unit,
     physical_bounds,
-    prior,
 )
 from ir_description.shapes import Body, Capsule
 from ir_msgs_py.plc import Signal
@@ -106,7 +104,6 @@ from ir_values.errors import (
 
 __all__ = [
     "AXIS_UNITS",
-    "CENTRES",
     "DATA_SHEET",
     "IDLE",
     "IDLE_WATTS",
@@ -190,7 +187,6 @@ __all__ = [
     "power_marks",
     "power_parameters_of",
     "power_parameters_to_yaml",
-    "prior",
     "read_cell_apart",
     "read_power_parameters",
     "robot_file_errors",

@@ -7,24 +7,19 @@
 Each study is a room; they share the work (processes, results, settings) and the errors.
 """
 
-from ir_studies.arena import ArenaSettings, read_settings, run_arena
-from ir_studies.errors import FolderError, SettingsError, StoppedError, StudyError, WorkerError
+from ir_studies.arena import read_settings, run_arena
+from ir_studies.errors import FolderError, SettingsError, StoppedError, WorkerError
 from ir_studies.layout import LayoutSettings, read_layout, run_layout
-from ir_studies.studies import KINDS, Kind, Study, StudyAnswer, read_study, study_of
+from ir_studies.studies import KINDS, read_study, study_of
 from ir_studies.work import Means
 
 __all__ = [
     "KINDS",
-    "ArenaSettings",
     "FolderError",
-    "Kind",
     "LayoutSettings",
     "Means",
     "SettingsError",
     "StoppedError",
-    "Study",
-    "StudyAnswer",
-    "StudyError",
     "WorkerError",
     "read_layout",
     "read_settings",

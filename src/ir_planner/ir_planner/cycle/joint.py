@@ -16,7 +16,7 @@ import numpy as np
 
 from ir_planner.cycle.linear import LinearProgram
 from ir_planner.cycle.steady import Curve, ModeWait, WaitMode
-from ir_values import FloatArray
+from ir_values.arrays import FloatArray
 
 _NO_WAIT = 1e-6  # s
 _SERIAL = 2.0  # times the seconds of one robot after the other: no shortest cycle is longer

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import highspy
 import numpy as np
 
-from ir_values import FloatArray
+from ir_values.arrays import FloatArray
 
 Terms = Mapping[int, float]
 """Coefficients by the index of their variable."""

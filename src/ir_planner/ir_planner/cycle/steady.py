@@ -19,7 +19,7 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from ir_planner.cycle.linear import LinearProgram
-from ir_values import FloatArray
+from ir_values.arrays import FloatArray
 
 UNITS_MAX = 2
 """Most units of a cycle."""

@@ -27,7 +27,7 @@ from ir_studies.cells.instance import (
     TimeLag,
     stay_ranges,
 )
-from ir_values import FloatArray
+from ir_values.arrays import FloatArray
 
 _FIRST_TANGENTS = 5
 _SLACK = 1e-7  # s, of bounds that were derived

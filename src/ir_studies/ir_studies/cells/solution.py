@@ -16,7 +16,7 @@ import numpy as np
 
 from ir_studies.cells.instance import Instance, InstanceRobot, Schedule
 from ir_studies.cells.model import CellModel
-from ir_values import FloatArray
+from ir_values.arrays import FloatArray
 
 PROVED = 1e-6
 """Relative difference of energy and bound from which on a schedule counts as proved."""
