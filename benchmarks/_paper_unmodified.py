@@ -30,7 +30,7 @@ from ir_planner.service.stochastic_withdrawal import ModifiedGa, withdraw
 from ir_planner.timing.straight_steps import straight_steps
 from ir_values.arrays import FloatArray
 
-VARIANTS = {"cnc_door": 8, "deep_box": 30, "demo": 8}  # of each per seed; closed: deep_box's
+VARIANTS = {"cnc_door": 8, "deep_box": 300, "demo": 8}  # of each per seed; closed: deep_box's
 EDGES = 8_000  # certified edges of a search, as for the modified one
 SECONDS = 20.0
 HALF = 50.0  # % of the searches
@@ -39,7 +39,7 @@ HALF = 50.0  # % of the searches
 PLAIN = Genetic(
     islands=1, parting=0.0, adaptation=0.0, first=1, attempts=1, generations=10_000, settle=0
 )
-_DRAWN = 50  # added to the seed: no other experiment draws these cells
+_DRAWN = 70  # added to the seed: no other experiment draws these cells
 KINDS = {"open": "OPEN", "semi-closed": "SEMI_CLOSED", "closed": "CLOSED"}
 
 
