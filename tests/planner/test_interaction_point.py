@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from ir_planner.configurations.ccd_search import (
     NONE,
     PRINTED,
     SECANT,
+    Descent,
     InteractionSettings,
     _Descent,
     descend,
@@ -288,9 +290,10 @@ def replayed(
     return float(q[1]), 3
 
 
+@pytest.mark.parametrize("at_a_limit", [False, True])
 @pytest.mark.parametrize("reading", [SECANT, PRINTED, GAIN])
 def test_a_step_that_collides_is_set_back_twice_at_most_and_else_taken_back(
-    reading: str, scene_of: Callable[[str], PlanningScene]
+    reading: str, at_a_limit: bool, scene_of: Callable[[str], PlanningScene]
 ) -> None:
     """Judge: each start by itself, by the formula of its worst pair."""
     scene = scene_of("demo")
@@ -299,6 +302,9 @@ def test_a_step_that_collides_is_set_back_twice_at_most_and_else_taken_back(
     rng = np.random.default_rng(0)
     starts = random_starts(robot.position_min, robot.position_max, 400, "uniform", rng)
     value = rng.uniform(robot.position_min[1], robot.position_max[1], len(starts))
+    if at_a_limit:
+        ends_of_range = [robot.position_min[1], robot.position_max[1]]
+        value = rng.choice(ends_of_range, len(starts))
     pose = np.array(scene.station("lathe_work").pose)
     descent = _Descent(pose, scene, threshold, InteractionSettings(set_back=reading))
     distance = scene.collision.distances(starts)
@@ -320,6 +326,34 @@ def starts_for_the_lathe(scene: PlanningScene) -> tuple[FloatArray, FloatArray, 
     return starts, pose, scene.thresholds(0.02, "lathe_work")
 
 
+def psi_of(q: FloatArray, pose: FloatArray, scene: PlanningScene) -> FloatArray:
+    """Psi (N,) of eq. (2) at q (N, n)."""
+    tcp = scene.chain.tcp_poses(q)
+    place = ((tcp[:, :3, 3] - pose[:3, 3]) ** 2).sum(axis=1)
+    turn = ((tcp[:, :3, :3] - pose[:3, :3]) ** 2).sum(axis=(1, 2))
+    return np.asarray(place + 0.125 * turn)
+
+
+def test_what_arrives_is_nearer_than_xi_and_what_does_not_is_not(
+    scene_of: Callable[[str], PlanningScene],
+) -> None:
+    scene = scene_of("demo")
+    starts, pose, threshold = starts_for_the_lathe(scene)
+    asked = InteractionSettings(set_back=NONE, sweeps=12, finish_every=12, newton_steps=0)
+
+    def search(xi: float) -> Descent:
+        work = Work(10_000, np.inf, lambda: 0.0)
+        return descend(pose, starts, scene, threshold, replace(asked, xi=xi), work)
+
+    ends = np.array([track[-1] for track in search(1e-16).tracks])
+    psi = psi_of(ends, pose, scene)
+    ranked = np.sort(psi)
+    for k in (5, 20):
+        xi = 0.5 * (ranked[k] + ranked[k + 1])
+        arrived = [outcome != "not converged" for outcome in search(float(xi)).outcome]
+        assert np.array_equal(arrived, psi < xi)
+
+
 def test_a_start_is_given_up_after_three_sweeps_in_a_row_without_gain(
     scene_of: Callable[[str], PlanningScene],
 ) -> None:
@@ -332,10 +366,7 @@ def test_a_start_is_given_up_after_three_sweeps_in_a_row_without_gain(
     given_up = 0
     for track, outcome in zip(found.tracks, found.outcome, strict=True):
         if outcome.startswith("set back for good"):
-            tcp = scene.chain.tcp_poses(track)
-            place = ((tcp[:, :3, 3] - pose[:3, 3]) ** 2).sum(axis=1)
-            turn = ((tcp[:, :3, :3] - pose[:3, :3]) ** 2).sum(axis=(1, 2))
-            psi = place + 0.125 * turn
+            psi = psi_of(track, pose, scene)
             left = psi[1:] / psi[:-1]
             assert len(left) >= 3
             assert (left[-3:] > 0.98).all()
