@@ -39,6 +39,17 @@ def arm_text(
     return "\n".join([*lines, extra, "</robot>"])
 
 
+@pytest.mark.parametrize("lines", [1, 3])
+def test_blank_lines_above_the_declaration_count_as_lines_alone(lines: int) -> None:
+    declared = f'{chr(10) * lines}<?xml version="1.0" encoding="utf-8"?>{arm_text()}'
+    assert urdf_arm(declared, "arm.urdf").origin == pytest.approx(
+        urdf_arm(arm_text(), "arm.urdf").origin
+    )
+    wrong = declared.replace('lower="-2.5"', 'lower="nan"', 1)
+    with pytest.raises(RobotFileError, match=rf":{9 + lines}: lower of limit of joint j1"):
+        urdf_arm(wrong, "arm.urdf")
+
+
 HOSTILE = (
     ('lower="-2.5"', 'lower="nan"', r":9: lower of limit of joint j1 is 'nan', must be a finite"),
     ('upper="2.5"', 'upper="inf"', r"is 'inf', must be a finite number"),
@@ -218,9 +229,12 @@ FACES = {
 }
 
 
+@pytest.mark.parametrize("above", ["", " \n\n"])
 @pytest.mark.parametrize("kind", FACES)
-def test_a_collada_file_counts_in_its_own_unit(kind: str) -> None:
-    triangles = triangles_from_collada(COLLADA.format(faces=FACES[kind]).encode())
+def test_a_collada_file_counts_in_its_own_unit(kind: str, above: str) -> None:
+    triangles = triangles_from_collada(
+        f'{above}<?xml version="1.0"?>{COLLADA.format(faces=FACES[kind])}'.encode()
+    )
     assert triangles.shape == (4, 3, 3)
     assert np.ptp(triangles.reshape(-1, 3), axis=0) == pytest.approx([0.1, 0.2, 0.3])
     assert triangles.reshape(-1, 3)[:, 0].min() == pytest.approx(0.05)

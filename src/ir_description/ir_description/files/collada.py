@@ -28,7 +28,7 @@ def triangles_from_collada(content: bytes) -> FloatArray:
         text = content.decode("utf-8-sig")
         if "<!DOCTYPE" in text or "<!ENTITY" in text:
             raise InvalidValueError("the file defines entities: they are not read")
-        root = Xml.fromstring(text)
+        root = Xml.fromstring(text.lstrip())  # blank lines above a declaration happen
     except (Xml.ParseError, UnicodeDecodeError) as error:
         raise InvalidValueError(f"this is not XML: {shown(str(error), 120)}") from error
     for element in root.iter():  # namespaces say the version only

@@ -131,7 +131,7 @@ def _document(text: str) -> Xml.Element:
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise InvalidValueError("the file defines entities: they are not read")
     try:
-        root = Xml.fromstring(text)
+        root = Xml.fromstring(text.lstrip())  # blank lines above a declaration happen
     except Xml.ParseError as error:
         raise InvalidValueError(f"this is not XML: {shown(str(error), 120)}") from error
     if root.tag not in ("sdf", "robot"):

@@ -262,7 +262,10 @@ def _read_file(path: Path, roots: FileRoots, chunks: ChunkReader) -> RawRecordin
     except OSError as error:
         raise ReadError(f"{path} can't be read: {error.strerror}") from error
     except InvalidMagic as error:
-        raise ReadError(f"{path} is not an MCAP file: its first bytes are others") from error
+        raise ReadError(
+            f"{path} is not an MCAP file: its first bytes are others; logs of joints and of power "
+            "are for ir energy fit and ir energy compare"
+        ) from error
     messages = sum(len(data) for data in found.data.values())
     if found.orphans:
         found.problems.append(f"{found.orphans} messages belong to channels that were lost")

@@ -114,12 +114,16 @@ class UrdfTree:
         return path
 
 
+_BLANK_ABOVE = re.compile(r"\A(\s+)<\?xml.*?\?>", re.DOTALL)
+"""Blank lines above an XML declaration, which other readers of URDFs pass over."""
+
+
 def urdf_tree(text: str, source: str) -> UrdfTree:
     """Read a URDF. Raises RobotFileError with the line of what is wrong."""
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise RobotFileError(source, 0, "the URDF defines entities: they are not read")
     try:
-        root = _parsed(text)
+        root = _parsed(_BLANK_ABOVE.sub(r"\1", text))
     except expat.ExpatError as error:
         raise RobotFileError(source, error.lineno, f"this is not XML: {error}") from error
     macro = next((each for each in root.iter() if each.tag.startswith("xacro:")), None)
