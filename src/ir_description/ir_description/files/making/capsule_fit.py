@@ -128,6 +128,7 @@ class _Rough:
         room = 0.5 * float(np.max(high - low))
         axes = [np.linspace(a - room, b + room, _GRID) for a, b in zip(low, high, strict=True)]
         self._grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        self._square = _square(self._grid)
         self._known: dict[int, tuple[_Part, list[tuple[_Part, _Part]]]] = {}
 
     def part(self, own: BoolArray) -> _Part:
@@ -151,7 +152,13 @@ class _Rough:
         return float(np.any([self._filled(fit) for fit in fits], axis=0).sum())
 
     def _filled(self, fit: CapsuleFit) -> BoolArray:
-        return np.asarray(beside_axis(self._grid, fit.p0, fit.p1) <= fit.radius)
+        """Points of the grid in a capsule; as beside_axis, without vectors of it in between."""
+        axis = fit.p1 - fit.p0
+        square = float(axis @ axis)
+        away = self._square - 2.0 * (self._grid @ fit.p0) + float(fit.p0 @ fit.p0)
+        along = self._grid @ axis - float(fit.p0 @ axis)
+        share = np.clip(along / square, 0.0, 1.0) if square > 0.0 else np.zeros(len(along))
+        return np.asarray(away - share * (2.0 * along - share * square) <= fit.radius**2)
 
     def _cuts(self, own: BoolArray) -> Iterator[tuple[_Part, _Part]]:
         for direction in _principal(self._triangles[own].reshape(-1, 3)):
