@@ -30,8 +30,9 @@ from ir_planner.scene.planning_scene import (
     path_cost,
     scene_with,
 )
+from ir_planner.search import genetic_correction
 from ir_planner.search.genetic_correction import Genetic, colliding_stretch, corrected
-from ir_planner.search.population import _Breeder, evolve, path_matrix
+from ir_planner.search.population import Evolution, _Breeder, evolve, path_matrix
 from ir_planner.search.registry import SEARCHES
 from ir_planner.search.variety import evenly, first_different
 from ir_values.errors import ParameterError
@@ -365,3 +366,82 @@ def test_settings_that_make_no_sense_are_refused_with_a_sentence(
 ) -> None:
     with pytest.raises(ParameterError, match=sentence.replace(".", r"\.")):
         Genetic(**values)
+
+
+def test_each_further_attempt_takes_four_times_the_margin(
+    scene_of: SceneOf, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = scene_of("open")
+    start, goal = next(
+        ends(scene, task.name)
+        for task in scene.cell.tasks
+        if not space_of(scene).edges_free(*(end[None] for end in ends(scene, task.name)))[0]
+    )
+    margins: list[float] = []
+
+    def stretch(path: FloatArray, proof: Any, space: FreeSpace, margin: float) -> Any:
+        margins.append(margin)
+        return path[:1], path[-1:]
+
+    def nothing(a: FloatArray, *_: Any) -> Evolution:
+        return Evolution([], 0.1, 0, a, 1)
+
+    monkeypatch.setattr(genetic_correction, "colliding_stretch", stretch)
+    monkeypatch.setattr(genetic_correction, "evolve", nothing)
+    chosen = replace(SETTINGS, margin=0.5, attempts=3)
+    corrected(start, goal, space_of(scene), chosen, np.random.default_rng(0))
+    assert margins == pytest.approx([0.5, 2.0, 8.0])
+
+
+def breeder(scene: PlanningScene, settings: Genetic) -> _Breeder:
+    """Of the first task of `open` whose straight movement is not free."""
+    space = space_of(scene)
+    for task in scene.cell.tasks:
+        a, b = ends(scene, task.name)
+        if not space.edges_free(a[None], b[None])[0]:
+            return _Breeder(a, b, space, settings, np.random.default_rng(0))
+    raise AssertionError("all tasks are free")
+
+
+def test_children_are_parted_from_the_worst_pair_by_what_is_missing(scene_of: SceneOf) -> None:
+    """Judge: the pair's distance at the worst sample, before and after; small steps only."""
+    scene = scene_of("open")
+    one = breeder(scene, replace(SETTINGS, population=400))
+    people = one._first()
+    rows = np.flatnonzero((people.shortfall > 1e-3) & (people.shortfall < 0.03))
+    assert len(rows) > 3
+    steps = one._parting(people, rows)
+    sample = people.sample[rows]
+    which = np.arange(len(rows))
+
+    def distance(vias: FloatArray) -> FloatArray:
+        q = one.samples(vias)[sample, which]
+        return scene.collision.distances(q)[which, people.pair[rows]]
+
+    gained = distance(people.vias[rows] + steps) - distance(people.vias[rows])
+    share = gained / people.shortfall[rows]
+    assert 0.8 < np.median(share) < 2.2
+    assert (share > 0.0).mean() > 0.9
+
+
+@pytest.mark.parametrize("parting", [0.0, 1.0])
+def test_a_share_of_the_children_is_parted(
+    scene_of: SceneOf, monkeypatch: pytest.MonkeyPatch, parting: float
+) -> None:
+    """Nothing else changes a child here."""
+    still = replace(SETTINGS, crossover=0.0, mutated_share=0.0, parting=parting)
+    one = breeder(scene_of("open"), still)
+    people = one._first()
+    monkeypatch.setattr(one, "_parting", lambda _, rows: np.full_like(people.vias[rows], 1e-3))
+    made: list[FloatArray] = []
+    evaluated = one.evaluated
+
+    def noted(vias: FloatArray, spread: FloatArray) -> Any:
+        made.append(vias)
+        return evaluated(vias, spread)
+
+    monkeypatch.setattr(one, "evaluated", noted)
+    one._next(people)
+    parents = np.clip(people.vias + parting * 1e-3, one.space.low, one.space.high)
+    known = {row.tobytes() for row in parents}
+    assert all(row.tobytes() in known for row in made[0])

@@ -7,6 +7,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -315,6 +317,30 @@ def test_a_step_that_collides_is_set_back_twice_at_most_and_else_taken_back(
         ends.add(back)
         assert got[1] == pytest.approx(expected, abs=1e-12)
     assert {0, 3} < ends
+
+
+def test_what_is_set_back_ends_at_the_joint_s_limit() -> None:
+    """As printed a joint goes farther in where bodies overlap: here it would come out behind the
+    body, beyond its limit.
+    """
+
+    def distances(q: FloatArray) -> FloatArray:
+        return np.where(np.abs(q - 0.85) < 0.35, -0.9, 1.0)
+
+    robot = SimpleNamespace(
+        position_min=np.array([-1.0]), position_max=np.array([1.0]), joint_axis=np.zeros((1, 3))
+    )
+    scene = SimpleNamespace(
+        cell=SimpleNamespace(robot=robot), collision=SimpleNamespace(distances=distances)
+    )
+    asked = InteractionSettings(set_back=PRINTED)
+    descent = _Descent(np.eye(4), cast(PlanningScene, scene), np.array([0.02]), asked)
+    start = np.zeros((1, 1))
+    aimed = np.array([1.0])
+    assert descent._stepped(start.copy(), 0, aimed, distances(start))[0].tolist() == [[0.0]]
+    robot.position_max[0] = 3.0
+    behind = descent._stepped(start.copy(), 0, aimed, distances(start))[0]
+    assert behind == pytest.approx(np.array([[1.9]]))
 
 
 def starts_for_the_lathe(scene: PlanningScene) -> tuple[FloatArray, FloatArray, FloatArray]:
