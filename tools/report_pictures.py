@@ -1,5 +1,5 @@
-"""Draw the pictures of docs/report.md and README.md: a report at a desk, on a tablet, a phone and
-paper; the live view; today's program beside the planner's.
+"""Draw the pictures of docs/report.md and README.md: a report at a desk, on a phone and on paper;
+the live view; today's program beside the planner's.
 
     make demo && python tools/report_pictures.py [--recording out/demo.mcap] [--folder docs/images]
 
@@ -35,24 +35,18 @@ class Shot:
     name: str
     size: tuple[int, int]
     at: str = "header"
-    dark: bool = False
     touch: bool = False
     media: str = "screen"
 
 
 SHOTS = (
     Shot("report.png", (1400, 1730)),
-    Shot("report_axes.png", (1400, 1500), at="#axes"),
-    Shot("report_tablet.png", (768, 1024), at="#motion", dark=True),
     Shot("report_phone.png", (390, 844), touch=True),
     Shot("report_methods.png", (1400, 640), at="#methods"),
     Shot("report_print.png", PAPER, media="print"),
 )
 COMPARED = Shot("compare.png", (1100, 880))
-LIVE_SHOTS = (
-    Shot("live.png", (1400, 1500)),
-    Shot("live_phone.png", (390, 1500), dark=True, touch=True),
-)
+LIVE = Shot("live.png", (1400, 1500))
 
 
 def main() -> int:
@@ -77,9 +71,8 @@ def main() -> int:
         file = write_before_after(found, planner.cell, Path(folder) / "compare.html")
         faults += _draw(browser, file, COMPARED, asked.folder)
         with live_view(analysis, _instant(analysis)) as server:
-            for shot in LIVE_SHOTS:
-                faults += _draw(browser, server.address, shot, asked.folder)
-    drawn = (*SHOTS, COMPARED, *LIVE_SHOTS)
+            faults += _draw(browser, server.address, LIVE, asked.folder)
+    drawn = (*SHOTS, COMPARED, LIVE)
     sys.stdout.write("".join(f"{asked.folder / shot.name}\n" for shot in drawn))
     sys.stderr.write("".join(f"{fault}\n" for fault in faults))
     return 1 if faults else 0
@@ -93,7 +86,7 @@ def _instant(analysis: Analysis) -> float:
 
 def _draw(browser: Browser, file: Path | str, shot: Shot, folder: Path) -> list[str]:
     """Writes one picture; returns what was wrong with the page."""
-    page = browser.open(file, *shot.size, dark=shot.dark, touch=shot.touch)
+    page = browser.open(file, *shot.size, touch=shot.touch)
     if isinstance(file, str):
         page.wait("document.getElementById('no-motion').hidden")
     if shot.media == "print":

@@ -544,7 +544,7 @@ def _access(each: StationAccess) -> list[Json]:
     words = f"{each.free} of {each.reached} free"
     if each.free and each.clearance is not None:
         words += f", {1e3 * each.clearance:.1f} mm"
-        words += " to what may be touched here" if each.clearance < MARGIN else ""
+        words += " to allowed contacts" if each.clearance < MARGIN else ""
     return [each.station, each.load, words, each.free > 0, one_line(each.sentence, _LINE)]
 
 
