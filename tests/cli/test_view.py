@@ -304,6 +304,8 @@ def test_a_recording_is_replayed_and_its_cell_planned(tmp_path: Path) -> None:
     try:
         view.until(lambda: (view.browser.state.get("plan") or {}).get("state") == "recorded")
         assert names(view.browser.scene()) == {"top", "pick"}
+        assert view.browser.state["origin"] == "Predicted, not driven"
+        assert [tile[0] for tile in view.browser.state["tiles"]][-1] == "least clearance"
         view.browser.press("plan")
         view.planned()
         view.browser.press("recorded")

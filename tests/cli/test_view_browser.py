@@ -19,6 +19,7 @@ from typing import Any
 import axe_core_python
 import pytest
 
+from ir_cli.main import main
 from ir_description import load_cell
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -148,19 +149,25 @@ def test_a_machine_that_the_mouse_drags_is_planned_anew(browser: Any, tmp_path: 
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("shown", ["demo", "small"])
+@pytest.mark.parametrize("shown", ["demo", "small", "recording"])
 def test_nothing_of_the_view_is_cut_overlaps_or_scrolls_and_axe_finds_nothing(
     browser: Any, tmp_path: Path, shown: str
 ) -> None:
-    if shown == "small":
+    ready = PLANNED
+    if shown != "demo":
         path = tmp_path / "small.yaml"
         path.write_text(CELL)
+    if shown == "recording":
+        path = tmp_path / "plan.mcap"
+        assert main(["plan", str(tmp_path / "small.yaml"), "-o", str(path)]) == 0
+        ready = "document.getElementById('link').textContent === 'recorded'"
+    if shown != "demo":
         shown = str(path)
     faults: dict[str, Any] = {}
     with viewed(shown) as address:
         for size, (wide, high) in SIZES.items():
             page = browser.open(address, wide, high, touch=size == "phone", dark=size == "phone")
-            page.wait(PLANNED, PATIENCE)
+            page.wait(ready, PATIENCE)
             page.wait("document.getElementById('no-motion').hidden", PATIENCE)
             page.run(
                 "document.querySelectorAll('details').forEach((each) => { each.open = true; })"

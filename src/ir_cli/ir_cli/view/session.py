@@ -144,6 +144,7 @@ BEAT = 1.0
 """Seconds after which the page hears that the view goes on."""
 _LINE = 400  # characters of a sentence on the page
 _SAME = 1e-9  # m, of poses
+PREDICTED = "Predicted, not driven"
 
 
 @dataclass(frozen=True)
@@ -400,7 +401,11 @@ class Session:
             for tile in driven_tiles(analysis)
         ]
         kind = "Simulated, not measured" if recording.origin == "simulated" else "Measured"
-        lines: list[Json] = ["The recording as it was driven; Plan again plans its cell."]
+        said = "The recording as it was driven; Plan again plans its cell."
+        if recording.only_planned:
+            kind = PREDICTED
+            said = "The plan as it was written; Plan again plans its cell."
+        lines: list[Json] = [said]
         self._say(
             origin=kind,
             recorded=True,
@@ -530,7 +535,7 @@ class Session:
         self._motion = plan.motion
         if plan.motion is not None:
             self._draw(planned_content(plan.motion.side, stage.cell))
-            self._say(hand=False, near=None, note="", origin="Predicted, not driven")
+            self._say(hand=False, near=None, note="", origin=PREDICTED)
         tiles = _tiles(plan.report) if plan.report is not None else []
         self._say(
             tiles=tiles,

@@ -156,7 +156,7 @@ def tiles(analysis: Analysis, costs: Costs | None = None) -> str:
     alone = [] if _held_against(analysis) else _paid(analysis, prices).tiles(prices)
     paid = (*alone, _yearly(analysis, prices), _saved(analysis))
     if analysis.recording.only_planned and program is None:
-        return _html([*paid, *_planned(analysis)])
+        return _html([*paid, *driven_tiles(analysis)])
     if program is None:
         none = Tile("program", "none executed", ("figures of the whole recording only",))
         return _html([*paid, none, *driven_tiles(analysis)])
@@ -164,8 +164,12 @@ def tiles(analysis: Analysis, costs: Costs | None = None) -> str:
 
 
 def driven_tiles(analysis: Analysis) -> list[Tile]:
-    """What was driven: its energy with what was predicted, its peak, and its least clearance."""
+    """What was driven: its energy with what was predicted, its peak, and its least clearance; of a
+    plan that was not driven what is predicted.
+    """
     program = analysis.program
+    if analysis.recording.only_planned and program is None:
+        return _planned(analysis)
     energy = _recorded(analysis) if program is None else _whole(analysis, program)
     return [energy, _peak(analysis), _clearance(analysis)]
 
