@@ -289,7 +289,7 @@ class Refinement:
                     slower = self._optimised(replace(solution, speed=speed), path)
                     found = self._refined(slower, path, effort)
             if found is None and self.context.motion is None:
-                return self._within_limits(path)
+                return self._at_a_short_duration(path)
         return found
 
     def near(self, known: Sequence[Movement]) -> Movement | None:
@@ -311,7 +311,7 @@ class Refinement:
         control = np.clip(start.control, robot.position_min, robot.position_max)
         return self.coarse_from(UniformSpline(control, start.interval), path, QUICK.coarse)
 
-    def _within_limits(self, path: FloatArray) -> Movement | None:
+    def _at_a_short_duration(self, path: FloatArray) -> Movement | None:
         """The movement near a path at a requested duration that hardly leaves joules to choose: the
         fastest one stretched, or a cheaper one.
         """
