@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from ir_cli.ros.node_parameters import FIXED, NODE_SETTINGS
+from ir_cli.ros.up import FIXED, NODE_SETTINGS
 from ir_planner.search import registered
 from ir_values.settings import settings_table
 

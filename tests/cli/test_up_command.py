@@ -19,9 +19,8 @@ from ir_cli.errors import CommandError
 from ir_cli.main import main
 from ir_cli.ports import TCP, UDP, PortClaims, free_port, is_free
 from ir_cli.ros import domain as alone
-from ir_cli.ros.node_parameters import given_parameters, parameters_of
 from ir_cli.ros.processes import cell_nodes
-from ir_cli.ros.up import choose_ports
+from ir_cli.ros.up import choose_ports, given_parameters, parameters_of
 from ir_msgs_py.ros.testing import PATIENCE
 
 WAITING = """

@@ -16,7 +16,7 @@ from ir_planner import PlannerSettings
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
 from ir_planner.search import SEARCHES, Ends, Found
-from ir_program_runner.parameters import declare_parameters
+from ir_program_runner.node import declare_parameters
 from ir_recorder.node.recorder import declared_settings
 from ir_sim_driver.node.parameters import DriverParameters
 from ir_values.settings import setting

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rclpy.node import Node
 
 from ir_msgs_py.modes import PREFIX, TransitionTimes
-from ir_program_runner.parameters import declare_parameters
+from ir_program_runner.node import declare_parameters
 from ir_values.settings import describe
 
 

@@ -19,8 +19,8 @@ from ir_planner import Planner
 from ir_recorder.analysis.intervals import mean_of
 from ir_studies import FolderError, Means, SettingsError, read_study, study_of
 from ir_studies.statistics.findings import findings_of
-from ir_studies.statistics.movements import NEAREST, maker, pair_of, places_of
 from ir_studies.statistics.outputs import columns, page_html, summary_of
+from ir_studies.statistics.runs import NEAREST, maker, pair_of, places_of
 from ir_studies.statistics.settings import EXAMPLE, StatisticsSettings, statistics_settings
 
 ASKED = StatisticsSettings("open")

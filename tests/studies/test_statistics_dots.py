@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ir_studies.statistics.dots import dots
 from ir_studies.statistics.findings import Comparison, compared
+from ir_studies.statistics.outputs import dots
 
 
 def of(shares: list[float], name: str = "energy") -> Comparison:

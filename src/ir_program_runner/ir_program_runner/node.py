@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from rclpy.action import CancelResponse
@@ -20,13 +21,14 @@ from ir_msgs.msg import ProgramState as ProgramStateMsg
 from ir_msgs.msg import Signal as SignalMsg
 from ir_msgs_py import names
 from ir_msgs_py.announcements import Event, ProgramState
-from ir_msgs_py.modes import Mode
+from ir_msgs_py.modes import PREFIX, Mode, TransitionTimes
 from ir_msgs_py.plc import Signal, magic_packet, send_packet
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros.conversions import status_to_msg, time_from_msg
 from ir_msgs_py.ros.diagnostics import OK, WARN, Condition, Diagnostics
 from ir_msgs_py.ros.node_clients import DriverClient, PlannerClient, node_time
 from ir_msgs_py.ros.node_process import run_node
+from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.ros.plan_conversions import planned_movement_from_msg
 from ir_msgs_py.ros.power_conversions import program_state_to_msg, signal_from_msg, signal_to_msg
 from ir_msgs_py.ros.serving import RecordedActionServer
@@ -36,7 +38,6 @@ from ir_msgs_py.status import Status, StatusCode
 from ir_program_runner.errors import ProgramError
 from ir_program_runner.fulfilment import Fulfilment, Ports
 from ir_program_runner.machines import MOST_SIGNALS, Machines, MachineTime
-from ir_program_runner.parameters import declare_parameters
 from ir_program_runner.program import (
     MOST_STEPS,
     Program,
@@ -47,8 +48,37 @@ from ir_program_runner.program import (
     step_name,
 )
 from ir_program_runner.requests import Announce
-from ir_program_runner.settings import LinkSettings
+from ir_program_runner.settings import LinkSettings, ProgramSettings
 from ir_values.errors import InvalidValueError, ParameterError
+
+# The runner's settings as ROS parameters; none changes while a program runs.
+
+
+@dataclass(frozen=True)
+class RunnerParameters:
+    """What the node is set to; transitions count where the driver doesn't report them."""
+
+    program: Parameters[ProgramSettings]
+    transitions: Parameters[TransitionTimes]
+    links: Parameters[LinkSettings]
+
+
+def declare_parameters(node: Node, busy: Callable[[], bool]) -> RunnerParameters:
+    """Declare all; a change while `busy` is refused. Raises ParameterError for a bad value at the
+    start.
+    """
+
+    def refuse(names: tuple[str, ...]) -> str:
+        return (
+            f"a program runs: {', '.join(names)} can be changed when it has ended" if busy() else ""
+        )
+
+    return RunnerParameters(
+        Parameters(node, ProgramSettings, refuse=refuse),
+        Parameters(node, TransitionTimes, prefix=PREFIX, refuse=refuse),
+        Parameters(node, LinkSettings, refuse=refuse),
+    )
+
 
 # Diagnostics: a silent driver, or a program that failed, is a warning.
 

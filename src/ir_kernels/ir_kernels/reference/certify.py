@@ -194,7 +194,7 @@ class _Earliest:
     @property
     def ends(self) -> FloatArray:
         """Where (M,) a motion needs no further look."""
-        return np.minimum(self.hit_at, self._stuck_from)
+        return np.asarray(np.minimum(self.hit_at, self._stuck_from))
 
     def hit(self, row: int, time: float, pair: int) -> None:
         """A collision."""

@@ -19,7 +19,7 @@ READY = {"ready": True}
 MAKERS = {
     "arena": "ir_studies.arena.one_run",
     "layout": "ir_studies.layout.search",
-    "statistics": "ir_studies.statistics.movements",
+    "statistics": "ir_studies.statistics.runs",
 }
 """Modules by kind of study; each has `maker(settings)`, which loads what is loaded once and returns
 what makes a row from the words of a job.
