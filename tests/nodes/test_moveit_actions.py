@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import threading
 from types import SimpleNamespace as Of
 from typing import Any
 
 import pytest
+from action_msgs.msg import GoalStatus
 from hypothesis import given
 from hypothesis import strategies as st
+from rclpy.action import ActionClient, CancelResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.task import Future
 
+from ir_msgs.action import ExecuteTrajectory
+from ir_msgs_py.ros.rclpy_inside import PatientActionServer
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.node import moveit_actions
-from ir_planner.node.moveit_actions import MoveAction, TrajectoryExecution
+from ir_planner.node.moveit_actions import AcceptedGoals, MoveAction, TrajectoryExecution
 
 TRAJECTORY = Of(
     multi_dof_joint_trajectory=Of(points=()), joint_trajectory=Of(points=("a", "b"), joint_names=())
@@ -92,6 +100,86 @@ def test_no_goal_that_was_accepted_before_a_stop_or_its_recovery_is_driven(event
             )
             assert (len(driven) > before) == status.ok == (accepted == history)
             assert status.ok or status.code == StatusCode.PREEMPTED
+
+
+@pytest.fixture
+def execution() -> TrajectoryExecution:
+    return TrajectoryExecution(lambda goal, stopped: None, lambda trajectory: None)
+
+
+def test_goals_of_an_action_server_end_as_they_were_asked_to(
+    execution: TrajectoryExecution, ros_executor: Any, ros_node: Any, wait_for: Any
+) -> None:
+    """With rclpy's own handles, which have no hash, on an action of this project."""
+    goals = AcceptedGoals(execution)
+
+    def accepted(goal: Any) -> None:
+        goals.add(goal)
+        goal.execute()
+
+    def cancel(goal: Any) -> CancelResponse:
+        goals.cancel(goal)
+        return CancelResponse.ACCEPT
+
+    async def execute(goal: Any) -> Any:
+        waits = Future()
+        with goals.stopped(goal).calling(lambda: waits.set_result(None)):
+            if goal.request.trajectory_id == "succeeds":
+                waits.set_result(None)
+            await waits
+        done = goal.request.trajectory_id == "succeeds"
+        goals.end(goal, StatusCode.SUCCESS if done else StatusCode.PREEMPTED)
+        return ExecuteTrajectory.Result()
+
+    server = ros_executor.run(
+        lambda: PatientActionServer(
+            ros_node,
+            ExecuteTrajectory,
+            "/drive",
+            execute,
+            handle_accepted_callback=accepted,
+            cancel_callback=cancel,
+            callback_group=ReentrantCallbackGroup(),
+        )
+    )
+    client = ros_executor.run(lambda: ActionClient(ros_node, ExecuteTrajectory, "/drive"))
+    wait_for(client.server_is_ready, what="the action is offered")
+    ends = {}
+    for name in ("succeeds", "stopped"):
+        goal = ExecuteTrajectory.Goal(trajectory_id=name)
+        sent = ros_executor.run(lambda goal=goal: client.send_goal_async(goal))
+        wait_for(sent.done, what="the goal is taken")
+        ends[name] = ros_executor.run(sent.result().get_result_async)
+    ros_executor.run(execution.stop)
+    wait_for(lambda: all(end.done() for end in ends.values()), what="the goals end")
+    assert ends["succeeds"].result().status == GoalStatus.STATUS_SUCCEEDED
+    assert ends["stopped"].result().status == GoalStatus.STATUS_ABORTED
+    ros_executor.run(client.destroy)
+    ros_executor.run(server.destroy)
+
+
+def test_a_goal_whose_client_cancels_it_ends_canceled_as_soon_as_it_may(
+    execution: TrajectoryExecution,
+) -> None:
+    """rclpy changes its state after the callback of the cancel, which has woken it."""
+    goals = AcceptedGoals(execution)
+    ended: list[str] = []
+    goal = Of(
+        goal_id=Of(uuid=bytes(16)),
+        is_cancel_requested=False,
+        canceled=lambda: ended.append("canceled"),
+        abort=lambda: ended.append("aborted"),
+    )
+    goals.add(goal)
+    goals.cancel(goal)
+    assert goals.stopped(goal).canceled
+    ending = threading.Thread(target=goals.end, args=(goal, StatusCode.PREEMPTED))
+    ending.start()
+    assert not ended
+    goal.is_cancel_requested = True
+    ending.join(PATIENCE)
+    assert ended == ["canceled"]
+    goals.cancel(goal)  # a cancel that comes late finds nothing
 
 
 def test_a_stop_while_it_is_driven_ends_it_with_the_words_of_the_controller() -> None:

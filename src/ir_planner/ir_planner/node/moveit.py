@@ -11,7 +11,6 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
@@ -53,6 +52,7 @@ from ir_planner.node.inputs import LastState, has_joints, measured_velocity, of_
 from ir_planner.node.moveit_actions import (
     EXECUTE,
     MOVE,
+    AcceptedGoals,
     MoveAction,
     TrajectoryExecution,
     other_controller,
@@ -85,7 +85,6 @@ from ir_values.errors import (
 _THREADS = 8  # long and quick requests, scenes, topics, two goals, cancelling, a spare
 _GOALS_WAITING = 100  # of an action; beyond, a client is in a loop
 _PATIENCE = 10.0  # s for an answer beside the planning time
-_MOMENT = 1e-3  # s between two looks
 _PAIRS = 20  # of a state that are looked at
 _ROBOT_LINK, _WORLD_OBJECT, _ATTACHED = range(3)  # of moveit_msgs/ContactInformation
 
@@ -393,14 +392,6 @@ def set_planner_params(request: Any, response: Any) -> Status:
     return Status.success("nothing was set")
 
 
-@dataclass(eq=False)
-class _Accepted:
-    """A goal that is accepted and has not ended: what cancels it, and whether its client does."""
-
-    stopped: Cancellation
-    by_client: bool = False
-
-
 class MoveItNode(Node):
     """Serves MoveIt's services and actions. Raises IrError where moveit_msgs is missing."""
 
@@ -498,42 +489,37 @@ class MoveItNode(Node):
     def _offer_action(self, kind: str, run: Callable[..., Status]) -> RecordedActionServer:
         """Serve an action of moveit_msgs: its goals are carried out one after the other."""
         action_type = getattr(import_module("moveit_msgs.action"), kind)
-        accepted: dict[bytes, _Accepted] = {}
+        accepted = AcceptedGoals(self._executor)
 
         def execute(goal: ServerGoalHandle) -> Any:
-            one = accepted[_key(goal)]
+            stopped = accepted.stopped(goal)
 
             def feedback(state: str) -> None:
                 goal.publish_feedback(action_type.Feedback(state=state))
 
             def work(request: Any, result: Any) -> Status:
-                return run(request, result, one.stopped, feedback)
+                return run(request, result, stopped, feedback)
 
             result = self._guarded(ACTIONS[kind], work)(goal.request, action_type.Result())
             feedback("IDLE")
-            del accepted[_key(goal)]
-            _end(goal, result.error_code.val, one)
+            accepted.end(goal, result.error_code.val)
             return result
 
         def refuse(goal: ServerGoalHandle) -> Any:
-            del accepted[_key(goal)]
             result = action_type.Result()
             sentence = f"{_GOALS_WAITING} goals of {ACTIONS[kind]} wait already"
             put_error_code(result, Status(StatusCode.FAILURE, sentence, self.get_name()))
-            goal.abort()
+            accepted.end(goal, result.error_code.val)
             return result
 
         goals = GoalQueue(execute, refuse, _GOALS_WAITING)
 
         def accept(goal: ServerGoalHandle) -> None:
-            accepted[_key(goal)] = _Accepted(self._executor.accept())
+            accepted.add(goal)
             goals.accepted(goal)
 
         def cancel(goal: ServerGoalHandle) -> CancelResponse:
-            one = accepted.get(_key(goal))
-            if one is not None:
-                one.by_client = True
-                one.stopped.cancel()
+            accepted.cancel(goal)
             return goals.cancel(goal)
 
         return RecordedActionServer(
@@ -614,23 +600,6 @@ class MoveItNode(Node):
 
         self._last.look = look
         look()
-
-
-def _key(goal: ServerGoalHandle) -> bytes:
-    """What tells a goal from others; its handle has no hash."""
-    return bytes(goal.goal_id.uuid)
-
-
-def _end(goal: ServerGoalHandle, code: int, one: _Accepted) -> None:
-    """End a goal as MoveIt does: succeeded, canceled where its client asked for it, aborted."""
-    if code == StatusCode.SUCCESS:
-        goal.succeed()
-    elif one.by_client:
-        while not goal.is_cancel_requested:  # rclpy says so just after the callback of the cancel
-            time.sleep(_MOMENT)
-        goal.canceled()
-    else:
-        goal.abort()
 
 
 def moveit_types() -> dict[str, Any]:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib import import_module
 from threading import Lock
+from time import sleep
 from typing import Any
 from weakref import WeakSet
 
@@ -19,6 +20,7 @@ from ir_values.errors import CallGivenUpError, IrError, shown
 MOVE = "move_action"
 EXECUTE = "execute_trajectory"
 STOP = "stop"
+_MOMENT = 1e-3  # s between two looks
 _SUCCESSFUL = 0  # of control_msgs/FollowJointTrajectory
 _REFUSED = (-1, -2, -3)  # there: the goal, its joints, its stamp
 _CONTROL_FAILED = -4  # of moveit_msgs/MoveItErrorCodes
@@ -97,6 +99,51 @@ class TrajectoryExecution:
             code = StatusCode.INVALID_MOTION_PLAN if refused else _CONTROL_FAILED
             return Status(code, f"the controller says: {result.error_string}")
         return Status.success("driven to the end")
+
+
+@dataclass(eq=False)
+class _Accepted:
+    """What cancels a goal, and whether its client has."""
+
+    stopped: Cancellation
+    by_client: bool = False
+
+
+class AcceptedGoals:
+    """Goals of an action server of rclpy from when they are accepted until they end: canceled by
+    their clients, or all by a stop. A goal's handle has no hash: its id tells it from others.
+    """
+
+    def __init__(self, executor: TrajectoryExecution) -> None:
+        self._executor = executor
+        self._goals: dict[bytes, _Accepted] = {}
+
+    def add(self, goal: Any) -> None:
+        """A goal is accepted."""
+        self._goals[bytes(goal.goal_id.uuid)] = _Accepted(self._executor.accept())
+
+    def stopped(self, goal: Any) -> Cancellation:
+        """What cancels it."""
+        return self._goals[bytes(goal.goal_id.uuid)].stopped
+
+    def cancel(self, goal: Any) -> None:
+        """Its client cancels it; where it has ended nothing is left to do."""
+        one = self._goals.get(bytes(goal.goal_id.uuid))
+        if one is not None:
+            one.by_client = True
+            one.stopped.cancel()
+
+    def end(self, goal: Any, code: int) -> None:
+        """End it as MoveIt does: succeeded, canceled where its client asked for it, aborted."""
+        one = self._goals.pop(bytes(goal.goal_id.uuid))
+        if code == StatusCode.SUCCESS:
+            goal.succeed()
+        elif one.by_client:
+            while not goal.is_cancel_requested:  # rclpy says so just after the cancel's callback
+                sleep(_MOMENT)
+            goal.canceled()
+        else:
+            goal.abort()
 
 
 @dataclass(frozen=True)
