@@ -4,6 +4,7 @@ and in every table, whatever a recording holds and costs are given.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +27,7 @@ from ir_recorder.report import report_html
 from ir_recorder.report.compare import comparison_html
 from ir_recorder.report.costs import J_PER_KWH, Costs, money
 from ir_recorder.report.fleet import by_mode, fleet_columns, fleet_html, member_of, robots_of
-from ir_recorder.report.number_text import kilowatt_hours
+from ir_recorder.report.number_text import kilowatt_hours, yearly_kilowatt_hours
 
 PAUSES = ("", "600 s, 1800 s", "5 s, 7 s", "60 s")
 
@@ -135,3 +136,21 @@ def test_savings_are_of_the_cycle_that_is_counted(found: Analysis) -> None:
     assert total.seconds == pytest.approx(found.savings.total.seconds + added)
     if found.savings.total.saved_high > found.savings.total.saved_low:
         assert total.saved_low <= total.saved <= total.saved_high
+
+
+@pytest.mark.parametrize(
+    ("energy", "shown", "of_a_year"),
+    [
+        (0.0, "0 Wh", "0 kWh"),
+        (20.0, "20 J", "0.00000556 kWh"),
+        (328_480.0, "91.2 Wh", "0.0912 kWh"),
+        (3.59e6, "997 Wh", "0.997 kWh"),
+        (8.6e6, "2.39 kWh", "2.39 kWh"),
+        (4.2948e9, "1 193 kWh", "1 193 kWh"),
+        (math.nan, "–", "–"),
+    ],
+)
+def test_energies_are_in_wh_below_a_kilowatt_hour_but_in_a_column_of_years(
+    energy: float, shown: str, of_a_year: str
+) -> None:
+    assert (kilowatt_hours(energy), yearly_kilowatt_hours(energy)) == (shown, of_a_year)

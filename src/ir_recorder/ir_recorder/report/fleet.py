@@ -56,6 +56,7 @@ from ir_recorder.report.number_text import (
     significant,
     text,
     watts,
+    yearly_kilowatt_hours,
 )
 from ir_recorder.report.page import PAGE_START, asset, folded
 from ir_recorder.report.paid import Paid, Tile, row_of
@@ -651,8 +652,8 @@ def _row(name: str, own: Mapping[str, float], robots: Sequence[Robot]) -> tuple[
     shown = [own.get(robot.name) for robot in robots[:_COLUMNS]]
     if len(robots) > _COLUMNS:
         shown.append(sum(own.get(robot.name, 0.0) for robot in robots[_COLUMNS:]))
-    cells = (DASH if value is None else text(kilowatt_hours(value)) for value in shown)
-    return (text(_shown(name)), *cells, f"<b>{text(kilowatt_hours(sum(own.values())))}</b>")
+    cells = (DASH if value is None else text(yearly_kilowatt_hours(value)) for value in shown)
+    return (text(_shown(name)), *cells, f"<b>{text(yearly_kilowatt_hours(sum(own.values())))}</b>")
 
 
 def _potential(members: Sequence[Member], robots: Sequence[Robot], costs: Costs) -> str:

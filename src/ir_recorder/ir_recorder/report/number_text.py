@@ -77,6 +77,15 @@ def watt_hours(value: float) -> str:
     return f"{significant(value / 3600.0, 3) if abs(value) >= _NO_JOULES else 0} Wh"
 
 
+def yearly_kilowatt_hours(value: float) -> str:
+    """Joules of a year as kWh with three significant digits, whole ones from 100 on: for a column
+    whose figures are far apart.
+    """
+    if not math.isfinite(value) or abs(value) >= 3.6e6:
+        return kilowatt_hours(value)
+    return f"{significant(value / 3.6e6, 3) if abs(value) >= _NO_JOULES else 0} kWh"
+
+
 def kilograms(value: float) -> str:
     """kg with three significant digits, whole ones from 100 on."""
     if not math.isfinite(value):
