@@ -118,7 +118,7 @@ _NUMBERS = (
     "peak_w", "path_m", "movement_cost", "torque_share",
 )  # fmt: skip
 _TEXTS = ("timing", "trajectory_id", "message")
-_HEADS = ("", ">pairs", ">mean difference, 90 %", ">median, 90 %", ">less / equal / more", ">effect d")
+_HEADS = ("", ">pairs", ">mean difference, 90 %", ">median, 90 %", ">less / equal / more", ">d")
 _SUMMED_UP = (
     "comparison", "pairs", "values", "mean_percent", "low_percent", "high_percent", "median_percent",  # noqa: E501
     "median_low_percent", "median_high_percent", "effect", "less", "more", "chance", "shown",
