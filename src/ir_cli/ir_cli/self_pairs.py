@@ -35,7 +35,6 @@ construction.
 ROOM = 0.002
 """m below the distance that a tenth of the postures do not reach."""
 _DEEPEST = 0.1  # of the postures of a pair that is built so, which are not allowed
-_BUILT_SO = 0.5  # of the postures in which rings that meet do so by construction
 _RING = 0.01  # m: width and height of a ring
 _BESIDE = 0.02  # m from a ring that is built so: taken for built so, too
 _LEFT = 0.3  # of the postures that a pair must leave
@@ -352,7 +351,7 @@ class _Rings:
         so.
         """
         count = self._counts[side]
-        usual = [ring for ring, times in count.items() if times >= _BUILT_SO * len(self._q)]
+        usual = [ring for ring, times in count.items() if times == len(self._q)]
         places, of = self._cells(side, pieces.at)
         if not (len(usual) and len(places)):
             return np.ones(len(of), dtype=bool)
@@ -448,7 +447,7 @@ class _Meeting:
             return found
         self._counted = {k: each.of_pieces(away[k]) for k, each in enumerate(self._surfaces)}
         self.built_so = (
-            "rings about a joint that do so in half of all, and what is within "
+            "rings about a joint that do so in all that were counted, and what is within "
             f"{1e3 * _BESIDE:g} mm, are taken for built so"
         )
         return self._found(distance, usual)
