@@ -120,7 +120,12 @@ def _joules(axes: Axes, analysis: Analysis) -> None:
 def _path(axes: Axes, analysis: Analysis) -> None:
     cell = analysis.cell
     joints = analysis.recording.joints
-    axes.set(xlabel="x [m]", ylabel="y [m]", title="Tool path from above, by power", aspect="equal")
+    axes.set(
+        xlabel="x [m]",
+        ylabel="y [m]",
+        title="Tool path from above, wide: much power",
+        aspect="equal",
+    )
     _plain(axes)
     if cell is None or joints is None or joints.position.shape[1] != cell.robot.n:
         return
@@ -134,9 +139,9 @@ def _path(axes: Axes, analysis: Analysis) -> None:
     stride = max(1, len(joints.time) // MOST_POINTS)
     q = np.ascontiguousarray(joints.position[::stride])
     place = Chain(cell.robot, cell.base_pose, cell.tcp).tcp_poses(q)[:, :3, 3]
-    drawn = axes.scatter(
-        place[:, 0], place[:, 1], c=_power_at(analysis, joints.time[::stride]), s=5, cmap="turbo"
-    )
+    power = _power_at(analysis, joints.time[::stride])
+    wide = 3.0 + 27.0 * power / max(float(np.nanmax(power, initial=0.0)), 1.0)
+    drawn = axes.scatter(place[:, 0], place[:, 1], c=power, s=wide, cmap="viridis_r")
     axes.figure.colorbar(drawn, ax=axes, label="W", shrink=0.8)
     axes.plot(*cell.base_pose[:2, 3], marker="o", color="#39434f", markersize=9)
 
