@@ -28,7 +28,7 @@ from ir_msgs_py.status import StatusCode
 from ir_msgs_py.stops import same_driver
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.controller.mains import Mains
-from ir_sim_driver.node import SimDriver, streams
+from ir_sim_driver.node import SimDriver, topics
 from ir_sim_driver.plant import plant_to_yaml, typical_plant
 from ir_sim_driver.plc.modbus import COILS
 from ir_values.errors import RequestRefusedError
@@ -123,10 +123,10 @@ def test_each_driver_has_stop_numbers_of_its_own(make_driver, listen, wait_for):
 
 def test_joint_states_are_published_before_the_meter_is_read(make_driver, wait_for, monkeypatch):
     happened = []
-    fill = streams.fill_joint_state
+    fill = topics.fill_joint_state
     settle = Mains.settle
     monkeypatch.setattr(
-        streams, "fill_joint_state", lambda *a: (happened.append("joints"), fill(*a))[1]
+        topics, "fill_joint_state", lambda *a: (happened.append("joints"), fill(*a))[1]
     )
     monkeypatch.setattr(Mains, "settle", lambda mains: (happened.append("meter"), settle(mains))[1])
     make_driver()
