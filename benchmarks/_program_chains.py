@@ -269,7 +269,7 @@ class Chains:
             movement = timed_service(node.line, entry, context)
         except TimingError:
             return None
-        return movement.report if movement.violation is None else None
+        return movement.report if movement.prove().violation is None else None
 
     def _asked(self) -> bytes:
         o = self.options

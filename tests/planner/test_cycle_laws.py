@@ -114,7 +114,7 @@ def test_a_movement_at_a_value_costs_no_more_than_known_ones_slowed(
             context = replace(known[0].context, options=asked)
             found = optimised_near(known, context)
             assert found is not None
-            assert found.certified
+            assert found.prove().certified
             for other, slower in itertools.product(known, np.linspace(1.0, 3.0, 9)):
                 same = replace(other, context=context).stretched_by(float(slower))
                 assert worth(found, value) <= (1.0 + ROUNDING) * worth(same, value)

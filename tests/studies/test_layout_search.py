@@ -127,7 +127,8 @@ def test_what_is_left_behind(laid: Laid, tmp_path: Path) -> None:
 FULL = """
 import sys
 sys.path[:0] = {path!r}
-from ir_studies import Means, StudyError, read_layout, run_layout
+from ir_studies import Means, read_layout, run_layout
+from ir_studies.errors import StudyError
 try:
     run_layout(read_layout({settings!r}), {folder!r}, Means(1, command={command!r}))
 except StudyError as error:

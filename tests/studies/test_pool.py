@@ -29,9 +29,9 @@ re.match("(a+)+$", "a" * 60 + "b")  # for years, and with the interpreter locked
 STARTS = """
 import sys
 sys.path[:0] = {path!r}
-from ir_studies.work import Job, Task
+from ir_studies.work import Job, StudyJob
 from ir_studies.work.pool import Pool
-pool = Pool(Task("arena", {{}}, 3600.0), 1, (sys.executable, {worker!r}))
+pool = Pool(StudyJob("arena", {{}}, 3600.0), 1, (sys.executable, {worker!r}))
 list(pool.rows([Job("a")]))
 """
 ECHO = """
