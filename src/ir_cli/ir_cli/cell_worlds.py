@@ -98,9 +98,8 @@ def _container(text: bytes, binary: bytes) -> bytes:
     text += b" " * (-len(text) % 4)
     chunks = struct.pack("<II", len(text), _JSON) + text
     if binary:
-        chunks += (
-            struct.pack("<II", len(binary), _BIN) + binary
-        )  # of four-byte numbers: padded already
+        # of four-byte numbers: padded already
+        chunks += struct.pack("<II", len(binary), _BIN) + binary
     return struct.pack("<III", _MAGIC, _VERSION, 12 + len(chunks)) + chunks
 
 

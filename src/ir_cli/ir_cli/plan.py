@@ -226,9 +226,8 @@ def _page(
         file = str(Path(folder) / "plan.mcap")
         recording = _record(file, arguments, plan, planner, options)
         analysis = analyse(read_recording(recording))
-    moved = replace(
-        analysis.recording, planned=tuple(plan.movements)
-    )  # the file has no trajectories by step
+    # the file has no trajectories by step
+    moved = replace(analysis.recording, planned=tuple(plan.movements))
     problems = analysis.problems if plan.status.ok else (plan.status.message,)
     analysis = replace(analysis, recording=moved, problems=problems)
     sys.stderr.write(f"ir: {write_report(analysis, findings(analysis), page)}\n")

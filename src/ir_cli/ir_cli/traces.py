@@ -233,9 +233,8 @@ _TURN = 2.0 * np.pi
 # times its speed limit: no encoder's noise or clock's jitter at the rate of a log does this
 _FASTER = 3.0
 _NOISE = 0.002  # rad: coarser than any log is rounded
-_BEYOND = (
-    np.pi
-)  # rad outside of its range that a joint may be: what is more was never measured there
+# rad outside of its range that a joint may be: what is more was never measured there
+_BEYOND = np.pi
 
 
 def counted_turns(

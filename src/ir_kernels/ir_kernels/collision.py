@@ -204,9 +204,10 @@ class CollisionModel:
 def core_of(geometry: Geometry, module: compiled.Core) -> compiled.Core:
     """The model of one compiled module, or the one in NumPy where that is None."""
     if module is None:
+        # half of the import time, for those who need it
         from ir_kernels.reference.model import (
             Model,
-        )  # half of the import time, for those who need it
+        )
 
         return Model(geometry)
     chain = geometry.chain

@@ -128,12 +128,13 @@ class RobotLike(ChainLike, Protocol):
 
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
+# a robot without them has none
 FURTHER_LOSSES = (
     "iron_loss",
     "inverter_loss",
     "gear_loss",
     "idle_loss",
-)  # a robot without them has none
+)
 
 
 @dataclass(frozen=True)

@@ -250,9 +250,8 @@ class SearchedIk:
     def _of(self, targets: FloatArray, grid: int) -> list[Found]:
         pose, starts = self._guesses(targets, grid)
         best, error = newton(self.chain, targets[pose], starts, _STEPS)
-        slow = (error >= _EXACT) & (
-            error < _HOPEFUL
-        )  # beside a tangent, where each step gains one bit
+        # beside a tangent, where each step gains one bit
+        slow = (error >= _EXACT) & (error < _HOPEFUL)
         best[slow], error[slow] = newton(self.chain, targets[pose[slow]], best[slow], _MORE_STEPS)
         exact = error < _EXACT
         return _distinct(pose[exact], best[exact])

@@ -77,9 +77,8 @@ def what_if(
 
 def _row(base: Cell, change: Change, options: PlanOptions, stations: tuple[str, ...]) -> Row:
     """Plan with the values of one row."""
-    planner = Planner(
-        clock=itertools.repeat(0.0).__next__
-    )  # work is counted: the same rows on any machine
+    # work is counted: the same rows on any machine
+    planner = Planner(clock=itertools.repeat(0.0).__next__)
     nothing = dict.fromkeys(
         ("seconds", "joules", "joules_low", "joules_high", "kwh", "clearance"), np.nan
     )

@@ -60,9 +60,8 @@ class SteppedRun:
         self.signals: list[SignalChange] = []
         self.notes: list[str] = []
         self.deviation = 0.0
-        self.told: Callable[[Signal], None] = lambda signal: (
-            None
-        )  # whom the program's signals reach
+        # whom the program's signals reach
+        self.told: Callable[[Signal], None] = lambda signal: None
         self._movements: Sequence[PlannedMovement] = ()
         self._begin = (0.0, 0.0)
         self._start = (0.0, 0.0)

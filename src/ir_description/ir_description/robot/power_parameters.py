@@ -473,6 +473,7 @@ def prior(robot: RobotModel, power: PowerData, marks: Marks) -> PowerParameters:
         power.drives_and_brake_release,
         *(mode.controller_watts for mode in power.modes),
     ]
+    # in the order of AXIS_UNITS
     means = (
         robot.friction_viscous,
         robot.friction_coulomb,
@@ -480,7 +481,7 @@ def prior(robot: RobotModel, power: PowerData, marks: Marks) -> PowerParameters:
         robot.iron_loss,
         robot.inverter_loss,
         robot.gear_loss,
-    )  # in the order of AXIS_UNITS
+    )
     mean = np.concatenate([*means, np.ones(len(SCALARS)), watts])
     known = [_mark(name, robot, marks) for name in names]
     share = np.array([_share(name, mark, robot) for name, mark in zip(names, known, strict=True)])

@@ -113,11 +113,12 @@ def counterbalance_torque(
     ex, ez = data.rod_eye
     px = cos * ex + sin * ez
     pz = cos * ez - sin * ex
+    # |P - B| with |P| constant
     length = sqrt(
         cos * (-2.0 * (bx * ex + bz * ez))
         + sin * (-2.0 * (bx * ez - bz * ex))
         + (bx * bx + bz * bz + ex * ex + ez * ez)
-    )  # |P - B| with |P| constant
+    )
     volume = (length - data.rod_length_at_charge) * (-data.piston_area) + data.gas_volume
     pressure = power(volume * (1.0 / data.gas_volume), -data.exponent) * data.charge_pressure
     return pressure * data.piston_area * (pz * bx - px * bz) * power(length, -1.0)

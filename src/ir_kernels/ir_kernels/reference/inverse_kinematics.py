@@ -75,9 +75,8 @@ def wrist_branches(
         @ axis_rotation(z[1], arm[:, 1])
         @ axis_rotation(z[2], arm[:, 2])
     )
-    W = (
-        np.swapaxes(before, 1, 2) @ hand @ geometry.hand[:3, :3].T
-    )  # = exp(z4 q4) exp(z5 q5) exp(z6 q6)
+    # = exp(z4 q4) exp(z5 q5) exp(z6 q6)
+    W = np.swapaxes(before, 1, 2) @ hand @ geometry.hand[:3, :3].T
     e3 = np.cross(z[3], z[4])
     pointing = W @ z[5]
     c = pointing @ z[3]
@@ -91,9 +90,8 @@ def wrist_branches(
         sign = -1.0 if flip else 1.0
         q4 = np.where(singular, free_q4, np.arctan2(sign * a, -sign * b))
         q5 = np.arctan2(sign * s, c) - geometry.wrist_zero
-        rest = (
-            np.swapaxes(axis_rotation(z[3], q4) @ axis_rotation(z[4], q5), 1, 2) @ W
-        )  # = exp(z6 q6)
+        # = exp(z6 q6)
+        rest = np.swapaxes(axis_rotation(z[3], q4) @ axis_rotation(z[4], q5), 1, 2) @ W
         turned = rest @ z[4]
         q[:, flip] = np.stack(
             [q4, q5, np.arctan2(turned @ np.cross(z[5], z[4]), turned @ z[4])], axis=1

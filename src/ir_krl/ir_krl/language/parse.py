@@ -141,9 +141,8 @@ def parse(text: str, file: str) -> SourceFile:
     """
     if len(text) > TEXT_MAX:
         raise KrlError(f"{len(text)} characters: at most {TEXT_MAX} are read", SourcePlace(file))
-    text = (
-        text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
-    )  # as editors leave them
+    # as editors leave them
+    text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     try:
         units = _tree(_parser().parse(_prepared(text) + "\n")).children
     except RecursionError:

@@ -106,9 +106,8 @@ class Control:
     _timers: dict[int, Clock] = field(default_factory=dict)
     _flags: dict[int, SyntaxTree] = field(default_factory=dict)  # what cyclical flags are set to
     _said: dict[tuple[str, Effect], int] = field(default_factory=dict)  # where among the notes
-    _places: dict[int, set[SourcePlace]] = field(
-        default_factory=dict
-    )  # of a note that is said again
+    # of a note that is said again
+    _places: dict[int, set[SourcePlace]] = field(default_factory=dict)
 
     def _at(self, file: str) -> None:
         """Statements of this file run from here on."""

@@ -13,9 +13,8 @@ from ir_krl.errors import KrlError
 
 NAME_MAX = 24
 _NAME = re.compile(rf"[A-Za-z][A-Za-z0-9_]{{0,{NAME_MAX - 1}}}")
-_OWN = re.compile(
-    r"XHOME|XSTART|XM\d+_\d+|IR_\w*|XP\d+|FP\d+|PPDAT\d+|LCPDAT\d+"
-)  # what a written program calls its variables
+# what a written program calls its variables
+_OWN = re.compile(r"XHOME|XSTART|XM\d+_\d+|IR_\w*|XP\d+|FP\d+|PPDAT\d+|LCPDAT\d+")
 _WORDS = """
 ANIN ANOUT AND AXIS BOOL BRAKE B_AND B_EXOR B_NOT B_OR CASE CAST_FROM CAST_TO CHANNEL CHAR CIRC
 CIRC_REL CONFIRM CONST CONST_VEL CONTINUE CCLOSE COPEN CREAD CWRITE C_DIS C_ORI C_PTP C_SPL C_VEL

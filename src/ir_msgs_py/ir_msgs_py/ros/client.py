@@ -183,9 +183,8 @@ class GoalSender:
         result: Future = self._executor.run(handle.get_result_async)
         try:
             if self._ended(action, client, handle, result, result_timeout, give_up):
-                self._executor.run(
-                    _nothing
-                )  # feedback that came with the result is called back after it
+                # feedback that came with the result is called back after it
+                self._executor.run(_nothing)
                 return result.result().result
         except ServiceUnavailableError:  # nobody is there to cancel it
             raise

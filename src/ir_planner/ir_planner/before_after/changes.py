@@ -269,9 +269,8 @@ def _paused(before: CostedHop, after: CostedHop) -> tuple[int, str]:
 
 def _moved(before: CostedHop, after: CostedHop) -> tuple[int, str]:
     times = f"{after.seconds:.2f} s instead of {before.seconds:.2f} s"
-    along = (
-        before.steps[0].kind == MovementKind.CARTESIAN
-    )  # one movement, at rest at its corners as well
+    # one movement, at rest at its corners as well
+    along = before.steps[0].kind == MovementKind.CARTESIAN
     passed = 0 if along else len(before.steps) - len(after.steps)
     if passed > 0:
         times += f", {passed} stop{'s' if passed > 1 else ''} less on it"

@@ -205,9 +205,8 @@ def too_near(q: FloatArray, space: FreeSpace, what: str, safety_distance: float)
     z = int(space.scene.collision.min_distance(q[None], space.threshold).pair[0])
     if z < 0:
         return f"{what} is not free"
-    kept = min(
-        safety_distance, float(space.threshold[z]) + PROOF_TOLERANCE / 2
-    )  # a contact has its own
+    # a contact has its own
+    kept = min(safety_distance, float(space.threshold[z]) + PROOF_TOLERANCE / 2)
     return f"{what}: {too_near_sentence(pair_value(space.scene, q, z), kept)}"
 
 

@@ -64,9 +64,8 @@ def _at(path: FloatArray, passed: FloatArray, at: FloatArray) -> FloatArray:
     after = np.minimum(k + 1, len(path) - 1)
     length = (passed[after] - passed[k])[:, None]
     step = path[after] - path[k]
-    slope = np.divide(
-        step, length, out=np.zeros_like(step), where=length > 0.0
-    )  # at the end there is none
+    # at the end there is none
+    slope = np.divide(step, length, out=np.zeros_like(step), where=length > 0.0)
     return np.asarray(slope * (at - passed[k])[:, None] + path[k])
 
 

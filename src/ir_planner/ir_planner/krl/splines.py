@@ -171,9 +171,8 @@ def _hats(intervals: int) -> FloatArray:
 # speeds of its first part.
 
 _LINE_POINTS = 9  # of an SLIN part, so that the spline through them is straight
-_ARC_STEP = np.radians(
-    5.0
-)  # between points of an SCIRC part: the spline leaves the arc by 1e-6 of its radius
+# between points of an SCIRC part: the spline leaves the arc by 1e-6 of its radius
+_ARC_STEP = np.radians(5.0)
 _STEP_M = 4e-3
 _SAMPLES_MIN = 33
 _SAMPLES_MAX = 20_001
@@ -203,9 +202,8 @@ def timed_block(
     if times is None:
         return None
     times = times / block.parts[0].speeds.override
-    times = times * (
-        round(times[-1] / GRID_S) * GRID_S / times[-1]
-    )  # at rest where the last point lies
+    # at rest where the last point lies
+    times = times * (round(times[-1] / GRID_S) * GRID_S / times[-1])
     spline = resting_spline(times, points)
     inner = zip(
         times[:-1], times[1:], np.ceil(np.diff(times) * _KNOTS_PER_S).astype(int), strict=True

@@ -134,9 +134,8 @@ class PlannerNode(Node):
         long = self._long
         changes = MutuallyExclusiveCallbackGroup()  # a large cell holds up nobody but other changes
         texts = MutuallyExclusiveCallbackGroup()  # as long as what was loaded or planned
-        waiting = (
-            MutuallyExclusiveCallbackGroup()
-        )  # plans movements to postures where it is asked to
+        # plans movements to postures where it is asked to
+        waiting = MutuallyExclusiveCallbackGroup()
         for kind, name, handler, group in (
             (SetCell, names.SET_CELL, ask.set_cell, changes),
             (GetCell, names.GET_CELL, ask.get_cell, texts),

@@ -19,10 +19,11 @@ from ir_planner.scene import PlanningScene
 from ir_planner.timing import Movement
 from ir_values.arrays import FloatArray
 
+# control points that leave the path in tight corners, but are often faster in the end
 _FEW = (
     12,
     18,
-)  # control points that leave the path in tight corners, but are often faster in the end
+)
 _NEAR = 0.02  # rad that a fit may leave its path by, unless that takes too many points
 _SLOWEST = 3.0  # times the path at full speed: the longest duration that a descent starts from
 _REFINED = 3  # coarse solutions that are refined

@@ -459,9 +459,8 @@ class Refinement:
         q, _, _ = spline.samples(_ZONE_SAMPLES)
         inside = tcp_inside(q, context.scene, context.station, context.safety_distance)
         whole: BoolArray = np.asarray(inside.reshape(spline.intervals, -1).all(axis=1))
-        until = np.append(
-            whole[1:], whole[-1]
-        )  # the end of an interval is the beginning of the next
+        # the end of an interval is the beginning of the next
+        until = np.append(whole[1:], whole[-1])
         return np.asarray(whole & until, np.int32)
 
     def _with_larger_margin(self, solution: Solution, found: Violation) -> Solution:

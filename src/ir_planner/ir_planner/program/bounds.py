@@ -65,9 +65,8 @@ def least_cost(
     rise = potential_energy(second, scene)[None] - potential_energy(first, scene)[:, None]
     travel = np.abs(robot.coupling.motors(second[None] - first[:, None]))  # of the motors, at least
     work = rise + portable.matmul(travel, robot.friction_coulomb)
-    viscous = portable.matmul(
-        travel * travel, robot.friction_viscous
-    )  # J s: joules at an even speed, times the duration
+    # J s: joules at an even speed, times the duration
+    viscous = portable.matmul(travel * travel, robot.friction_viscous)
     with np.errstate(divide="ignore", invalid="ignore"):
         best = np.sqrt(rates.joule * viscous / rates.second) if rates.second > 0.0 else np.inf
         if scene.dc_bus.regeneration != "fed_back":  # energy from the mains is never negative

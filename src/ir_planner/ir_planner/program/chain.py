@@ -112,9 +112,8 @@ class CostEdges:
                 blocked += [] if space.straight_free(first[None], second[None])[0] else [part]
         if not blocked:
             return self._planned(parts)
-        self.movements.plan(
-            blocked[:1], self.improvement
-        )  # says what it is that time was too short for
+        # says what it is that time was too short for
+        self.movements.plan(blocked[:1], self.improvement)
         return [
             Settled(np.inf if part in blocked else 0.0, exact=part in blocked) for part in parts
         ]

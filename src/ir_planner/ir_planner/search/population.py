@@ -217,9 +217,8 @@ def path_matrix(shape: str, vias: int, samples: int) -> FloatArray:
         return np.ascontiguousarray(np.array(hats).T)
     spline = to_ppoly(spline_through(np.eye(vias + 2), times, virtual_knots(times)))
     u = np.linspace(0.0, 1.0, _FINE)
-    progress = np.maximum.accumulate(
-        portable.matmul(spline(u), times)
-    )  # of points that lie evenly on a line
+    # of points that lie evenly on a line
+    progress = np.maximum.accumulate(portable.matmul(spline(u), times))
     return np.ascontiguousarray(spline(np.interp(even, progress, u)))
 
 
@@ -270,9 +269,8 @@ class _Breeder:
                 break
             people = self._next(people)
             generations += 1
-        lack = np.where(
-            people.shortfall < 0.0, np.inf, people.shortfall
-        )  # free, but no better than others
+        # free, but no better than others
+        lack = np.where(people.shortfall < 0.0, np.inf, people.shortfall)
         best = int(np.argmin(lack))
         paths = sorted(self.found, key=lambda path: path_cost(self.weights, path))
         q = self.samples(people.vias[best : best + 1])[people.sample[best], 0]

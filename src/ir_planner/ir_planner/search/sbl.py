@@ -123,9 +123,8 @@ class LazyTrees:
 
 # configurations that cost as much as one certified edge, as in the genetic search
 _STATES_PER_EDGE = 40
-_SIZES = np.arange(1, 65).reshape(
-    16, 4
-)  # by which the cube is divided, sample by sample, in batches
+# by which the cube is divided, sample by sample, in batches
+_SIZES = np.arange(1, 65).reshape(16, 4)
 _CERTIFIED = 64  # level of an edge that is proved: beyond all that pieces are counted by
 
 

@@ -4,11 +4,12 @@ minimum.
 Paths are compared at a few places, by the largest difference of a joint. Where, and how much is
 enough, depends on what is known of them:
 
-    candidates of one search     at their middle waypoint     0.15 rad   (MIDDLE)
-    paths of the genetic search  along their whole length     a setting  (evenly)
-    coarse solutions             at nine shares of length     0.12 rad   (COARSE: nearer after a
-    descent) exit paths of a station      where they end               0.10 rad   (EXIT: they start
-    together)
+    candidates of one search     at their middle waypoint  0.15 rad   (MIDDLE)
+    paths of the genetic search  along their whole length  a setting  (evenly)
+    coarse solutions             at nine shares of length  0.12 rad   (COARSE)
+    exit paths of a station      where they end            0.10 rad   (EXIT)
+
+Coarse solutions come nearer to each other in a descent; exit paths start together.
 """
 
 from collections.abc import Callable, Iterable

@@ -23,9 +23,8 @@ from ir_planner.timing.blended_steps import stretched
 from ir_values.arrays import FloatArray
 
 _FACTORS = np.array([1.0, 1.04, 1.1, 1.18, 1.3, 1.5, 1.8, 2.2])
-_SLOWER = np.array(
-    [*_FACTORS, 3.0, 4.0, 6.0, 9.0, 14.0]
-)  # where a second costs what holding costs, and no more
+# where a second costs what holding costs, and no more
+_SLOWER = np.array([*_FACTORS, 3.0, 4.0, 6.0, 9.0, 14.0])
 # so near that the least cost is hardly missed; how many for J
 _CLOSE = portable.power(1.05, np.arange(54.0))
 _USUAL = 18

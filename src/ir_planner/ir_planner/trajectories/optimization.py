@@ -36,10 +36,11 @@ from ir_values.arrays import FloatArray
 # beyond the duration at which it is least, slower costs more of both.
 
 COUNT = 8  # durations from the fastest to the slowest end
+# factors on duration or energy by which neighbours of a thinned front differ
 _APART = (
     1.005,
     0.98,
-)  # factors on duration or energy by which neighbours of a thinned front differ
+)
 
 
 def pareto_front(known: list[Movement], context: Context) -> tuple[Movement, ...]:

@@ -86,9 +86,8 @@ def energy_flows(analysis: Analysis) -> EnergyFlows | None:
     inside = (power.time > start + 1e-9) & (power.time <= end + 1e-9)
     step = np.diff(power.time, prepend=power.time[:1])[inside]
     axes = power.joint_power[inside]
-    axes = (
-        np.nan_to_num(axes) if np.isfinite(axes).any() else axes
-    )  # a meter of the mains alone knows none
+    # a meter of the mains alone knows none
+    axes = np.nan_to_num(axes) if np.isfinite(axes).any() else axes
     tool = float(np.nan_to_num(power.tool_power[inside]) @ step)
     work, lifted, lowered = _mechanical(analysis, start, end)
     taken = float(step @ np.maximum(axes, 0.0).sum(axis=1))

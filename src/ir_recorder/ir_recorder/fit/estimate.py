@@ -172,11 +172,12 @@ def widening(
 # prior that one is taken by which what is left out is predicted best.
 
 DETERMINED = 0.8  # of the deviation before: what is left of it after the fit, at most
+# J: of the DC link, where the descent begins; its kinks make local minima
 SOFTNESS = (
     10.0,
     2.0,
     0.3,
-)  # J: of the DC link, where the descent begins; its kinks make local minima
+)
 FRICTION_SCALES = (1.0, 3.0, 10.0, 30.0)  # times the deviation of friction before any measurement
 _WIDER = 0.98  # of the error of what is left out: with more, a wider prior is not taken
 _ROUNDS = 30

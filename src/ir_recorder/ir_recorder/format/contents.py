@@ -28,6 +28,7 @@ RECORDING: Final = "recording"  # of a recording in several files: the same in a
 PART: Final = "part"  # which of them, from 0
 REPEATED: Final = "repeated"  # JSON: messages by topic that a part has again at its begin
 PARTS: Final = "ir_recorder_part"  # metadata record of these three
+# all others come from the recorder's parameter
 OWN_FACTS: Final = (
     VERSION,
     STARTED,
@@ -36,7 +37,7 @@ OWN_FACTS: Final = (
     RECORDING,
     PART,
     REPEATED,
-)  # all others come from the recorder's parameter
+)
 
 # facts with a meaning for the analysis; all others are only shown
 SAFETY_DISTANCE: Final = "safety_distance"  # S_m [m] that movements are planned with: "0.02 m"

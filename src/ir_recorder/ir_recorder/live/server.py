@@ -46,10 +46,11 @@ from ir_values.errors import one_line
 ADDRESS = "127.0.0.1"
 TOKEN_HEADER = "X-Live-Token"
 NAMES = (ADDRESS, "localhost")
+# of Sec-Fetch-Site: this page, or a person who typed the address
 _OWN_SITES = (
     "same-origin",
     "none",
-)  # of Sec-Fetch-Site: this page, or a person who typed the address
+)
 
 
 @dataclass(frozen=True)

@@ -218,9 +218,8 @@ class PlayNode(Node):
         if topic in self._feeds:
             return
         try:
-            self._schemas.schema(
-                type_name
-            )  # an installed type: a name from a file imports nothing else
+            # an installed type: a name from a file imports nothing else
+            self._schemas.schema(type_name)
             message_type = interface_type(type_name, "msg")
         except (SchemaError, UnknownTypeError):
             self.get_logger().warning(

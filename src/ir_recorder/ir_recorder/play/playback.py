@@ -28,11 +28,12 @@ TYPES = (  # commands of any controller, whatever their topic is called
     "ir_msgs/msg/PlcInputs",
     "ir_msgs/msg/Signal",
 )
+# nodes only report here
 SHOWN = (
     names.PLANNED_TRAJECTORY,
     names.PLC_INPUTS_IN_FORCE,
     names.MACHINE_SIGNALS,
-)  # nodes only report here
+)
 
 
 def is_command(topic: str, type_name: str = "") -> bool:

@@ -278,9 +278,8 @@ def _driven_plans(
     found: list[_Driven] = []
     answers_of = _answers_by_id(recorded, driven, definition)
     for program, trajectories in driven.items():
-        ids = (
-            {program} if program else trajectories - {""}
-        )  # steps that a client handed over have no name
+        # steps that a client handed over have no name
+        ids = {program} if program else trajectories - {""}
         named = answers_of.get(min(ids), []) if ids else []
         plans = [each for each in named if ids <= each.ids]
         own = [each for each in plans if program in ("", each.program)]

@@ -15,12 +15,13 @@ from ir_msgs_py import names
 from ir_msgs_py.names import NODES
 from ir_recorder.errors import RecorderError
 
+# in the cell's namespace
 SHARED = (
     names.JOINT_STATES,
     names.ROBOT_DESCRIPTION,
     names.TF,
     names.TF_STATIC,
-)  # in the cell's namespace
+)
 GLOBAL = (names.DIAGNOSTICS, names.ROSOUT, names.PARAMETER_EVENTS)
 MOST_TOPICS = 1000
 LONGEST_TOPIC = 255  # characters, as DDS has it

@@ -113,9 +113,8 @@ def test_it_follows_a_motion_with_the_torque_of_the_equations_of_motion(
     dynamics = DynamicsModel(cell.robot, tool(cell), cell.base_pose)
     expected = dynamics.inverse_dynamics(path[1:-1], middle, qdd)
     assert np.abs(work.speed - middle).max() < 0.01
-    sliding = (
-        np.abs(middle).min(axis=1) > 0.01
-    )  # below, each backend smooths friction in its own manner
+    # below, each backend smooths friction in its own manner
+    sliding = np.abs(middle).min(axis=1) > 0.01
     assert sliding.sum() > 0.8 * len(commands)
     off = work.torque - expected
     off[~sliding] = 0.0

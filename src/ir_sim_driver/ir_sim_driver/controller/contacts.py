@@ -279,9 +279,8 @@ class ContactWatch:
 
 # The cell around the robot as it is now.
 
-_PATIENCE = (
-    2.0 * SOON
-)  # s of the clock that a movement waits for a door that will be open within SOON
+# s of the clock that a movement waits for a door that will be open within SOON
+_PATIENCE = 2.0 * SOON
 
 
 class CellWatch:

@@ -27,9 +27,9 @@ class Mains:
         self._known = BasePower(standing_watts(data))
         self.meter = PowerMeter(plant, dt, regeneration)
         self._unsettled = 0
-        # steps at this level that the meter has not counted
         self._level = Mode.STAND_ON_MOTORS
         self._standing = True
+        # at this level, which the meter has not counted
         self._steps = 0
 
     def set_load(self, load: Carried) -> None:

@@ -123,9 +123,8 @@ class Pauses:
         if not self._route:
             return None
         depth = _DEPTH.get(self._modes.mode, 0)
-        settled = (
-            self._modes.mode in ROW
-        )  # a mode that is being entered is asked for until it is reached
+        # a mode that is being entered is asked for until it is reached
+        settled = self._modes.mode in ROW
         return next(
             (
                 mode

@@ -139,9 +139,8 @@ class _Run:
     error: FloatArray  # largest of each joint so far (n,) [rad]
     note: str  # what the outcome says beside how the goal ended
     s: float = 0.0
-    ahead: Iterator[tuple[float, FloatArray]] = field(
-        default_factory=lambda: iter(())
-    )  # at an even speed
+    # at an even speed
+    ahead: Iterator[tuple[float, FloatArray]] = field(default_factory=lambda: iter(()))
     settling: int = 0
     stopping: bool = False
     deviation: float = 0.0

@@ -17,9 +17,8 @@ from math import inf
 
 _NS = 1_000_000_000
 _BACK = _NS // 2  # a clock that is this far behind the next stamp has jumped
-_AT_ONCE = (
-    _NS // 10
-)  # a delay of up to this is made up for at once: no gap in what others see is shorter
+# a delay of up to this is made up for at once: no gap in what others see is shorter
+_AT_ONCE = _NS // 10
 # of an advance of the clock in which the process can't have looked: it was suspended
 _WALL_SHARE = 0.5
 
@@ -125,9 +124,8 @@ class Grid:
 # Thread with absolute deadlines.
 
 _POLL = 0.002  # s, while a clock stands still or has not started
-_STEP_MAX = (
-    _NS // 10
-)  # ns of real time that a scaled clock counts between two looks; more is a suspension
+# ns of real time that a scaled clock counts between two looks; more is a suspension
+_STEP_MAX = _NS // 10
 
 
 class GridThread:

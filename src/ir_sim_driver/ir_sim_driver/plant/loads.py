@@ -37,9 +37,8 @@ class LoadDiagram:
         origin = np.array(robot.joint_origin[-1])
         axis = np.array(robot.joint_axis[-1])
         self._mass = float(robot.rated_payload)
-        self._centre: FloatArray = (
-            -origin[:3, :3].T @ origin[:3, 3]
-        )  # of the wrist, in the last link's frame
+        # of the wrist, in the last link's frame
+        self._centre: FloatArray = -origin[:3, :3].T @ origin[:3, 3]
         self._axis: FloatArray = axis
         torque = np.array(robot.envelope_torque)[-2:]
         self._moments = torque[:, -1]

@@ -177,12 +177,13 @@ class BulletArm:
         self._bullet = _pybullet()
         self._client = -1
         self._release = weakref.finalize(self, _disconnect, self._bullet, self._client)
+        # it raises what C leaves
         self._errors = (
             self._bullet.error,
             SystemError,
             ValueError,
             TypeError,
-        )  # it raises what C leaves
+        )
         self._robot = robot
         self._dt = dt
         self._loads: tuple[Load, ...] = ()
@@ -292,9 +293,8 @@ class BulletArm:
 
     def _load(self, text: str) -> int:
         """The body of a URDF."""
-        file = os.memfd_create(
-            "robot.urdf"
-        )  # a full or read-only disk is no reason to have no robot
+        # a full or read-only disk is no reason to have no robot
+        file = os.memfd_create("robot.urdf")
         try:
             os.write(file, text.encode())
             path = f"/proc/self/fd/{file}"

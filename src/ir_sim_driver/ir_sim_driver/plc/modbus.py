@@ -395,9 +395,8 @@ class ModbusServer:
                 self._heard[writer] = self._loop.time()
                 writer.write(self._answer(*request))
                 await self._within(writer.drain())
-                await asyncio.sleep(
-                    0
-                )  # others' turn: requests that are here already need no waiting
+                # others' turn: requests that are here already need no waiting
+                await asyncio.sleep(0)
         except _DROPPED:
             pass
         finally:

@@ -51,9 +51,8 @@ def number(one: Row, name: str) -> float:
 
 NO_PAIR = "pairs without both movements"
 NOT_DRIVEN = "movements without a measurement"
-_FIGURES = re.compile(
-    r"[-+]?\d[\d.,]*(?:e[-+]?\d+)?\b|\([^()]*\)"
-)  # what differs where the reason is one
+# what differs where the reason is one
+_FIGURES = re.compile(r"[-+]?\d[\d.,]*(?:e[-+]?\d+)?\b|\([^()]*\)")
 
 
 @dataclass(frozen=True)

@@ -39,9 +39,8 @@ class _Worker:
     """One process, and the job that it makes. It ends with this process, whatever it does then."""
 
     def __init__(self, command: Sequence[str], task: StudyJob) -> None:
-        pipe = (
-            subprocess.PIPE
-        )  # a group of its own: Ctrl-C is for the study, which ends its workers
+        # a group of its own: Ctrl-C is for the study, which ends its workers
+        pipe = subprocess.PIPE
         held, self._lifeline = os.pipe()
         try:
             self.process = subprocess.Popen(

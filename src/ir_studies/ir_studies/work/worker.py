@@ -35,9 +35,8 @@ def maker_of(kind: str, settings: Mapping[str, Any]) -> Maker:
 
 def main() -> None:
     """Serve until the input ends. What libraries print goes to stderr."""
-    signal.signal(
-        signal.SIGINT, signal.SIG_IGN
-    )  # Ctrl-C is for who started it, who closes the input
+    # Ctrl-C is for who started it, who closes the input
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     tie()
     answers = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)

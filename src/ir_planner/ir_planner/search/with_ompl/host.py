@@ -232,9 +232,8 @@ def _answer(connection: Connection, process: int, problem: OmplProblem, work: Wo
     blocks.
     """
     with os.fdopen(os.memfd_create("problem"), "r+b") as sheet:
-        pickle.dump(
-            replace(problem, scene=replace(problem.scene)), sheet
-        )  # without what it has computed
+        # without what it has computed
+        pickle.dump(replace(problem, scene=replace(problem.scene)), sheet)
         sheet.flush()
         try:
             send_handle(connection, sheet.fileno(), process)
