@@ -1,5 +1,5 @@
-"""All searches by name: what `planner_id` may be. A new search is one file, and one line here; or
-an entry point of an installed package, in the group `ir_planner.searches`.
+"""All searches by name: what `planner_id` may be. A new search is one file, its import and one
+line here; or an entry point of an installed package, in the group `ir_planner.searches`.
 """
 
 from collections.abc import Callable, Mapping
