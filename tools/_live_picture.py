@@ -59,7 +59,8 @@ def _heard_at(analysis: Analysis, view: CellView, t: float) -> dict[str, Any]:
     assert cell is not None
     ended = [s.step.movement for s in analysis.steps if t - 1.0 / RATE <= s.step.end < t]
     step = next((s.step for s in reversed(analysis.steps) if s.step.start <= t < s.step.end), None)
-    movement = step.movement if step is not None else None
+    heard_of = [s.step.movement for s in analysis.steps if s.step.start <= t]  # as the node does
+    movement = heard_of[-1] if heard_of else None
     load = next((name for time, name in reversed(analysis.loads.observations) if time <= t), "none")
     q = joints.position[np.searchsorted(joints.time, t)]
     heard = ReceivedCell(
@@ -84,8 +85,8 @@ def _heard_at(analysis: Analysis, view: CellView, t: float) -> dict[str, Any]:
         },
         **{"in": _levels(recording.plc_inputs, t), "out": _levels(recording.plc_outputs, t)},
     }
-    if step is not None and movement is not None:
-        kind = "pause" if movement.is_pause else movement.kind
+    if step is not None:
+        kind = "pause" if step.movement.is_pause else step.movement.kind
         place = [step.index + 1, step.total]
         values["step"] = {
             "label": step.label,

@@ -305,6 +305,7 @@ def test_a_recording_is_replayed_and_its_cell_planned(tmp_path: Path) -> None:
         view.until(lambda: (view.browser.state.get("plan") or {}).get("state") == "recorded")
         assert names(view.browser.scene()) == {"top", "pick"}
         assert view.browser.state["origin"] == "Predicted, not driven"
+        assert view.browser.state["source"] == "recording plan.mcap"
         assert [tile[0] for tile in view.browser.state["tiles"]][-1] == "least clearance"
         view.browser.press("plan")
         view.planned()

@@ -184,6 +184,8 @@ def test_nothing_of_the_view_is_cut_overlaps_or_scrolls_and_axe_finds_nothing(
             if size != "paper":
                 count, faults[f"{size}, names"] = page.run(LABELS)
                 assert count
+                stations = page.run("document.querySelectorAll('.station:not([hidden])').length")
+                assert bool(stations) is (size == "desk")
                 page.run(f"{AXE}; 0")
                 faults[f"{size}, axe"] = page.run(FOUND)
             own(page, address)

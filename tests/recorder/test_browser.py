@@ -343,6 +343,27 @@ IN_REACH = f"""(() => {{ const {{ x, y, width, height }} = {STOP}.getBoundingCli
     return {STOP}.contains(document.elementFromPoint(x + width / 2, y + height / 2)); }})()"""
 
 
+def test_a_grip_is_a_gap_with_its_name_in_the_clearance(
+    browser: Any, live: tuple[LiveServer, Stream, list[tuple[str, bool]]]
+) -> None:
+    server, stream, _ = live
+    page = browser.open(server.address, *DESK)
+    page.wait("document.getElementById('no-motion').hidden")
+    page.run(
+        "window.drawn = new Set(); const fill = CanvasRenderingContext2D.prototype.fillText; "
+        "CanvasRenderingContext2D.prototype.fillText = function (words, ...more) "
+        "{ window.drawn.add(words); fill.call(this, words, ...more); }; 0"
+    )
+    near = [0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.1, "hand – table"]
+    for after in ({"near": near}, {"near": None}, {"near": near, "load": "gripper+gear"}, {}):
+        time.sleep(0.8)
+        stream.add(after)
+    page.wait("window.drawn.has('grips')")
+    assert not page.run("window.drawn.has('releases')")
+    assert page.faults == []
+    page.close()
+
+
 @pytest.mark.parametrize("size", [DESK, PHONE])
 def test_the_emergency_stop_is_always_in_reach_and_says_what_ends_it(
     browser: Any,
@@ -360,9 +381,16 @@ def test_the_emergency_stop_is_always_in_reach_and_says_what_ends_it(
     page.run(f"{STOP}.click()")
     wait_for(lambda: pressed == [("emergency_stop", True)], page)
     levels = {"ab": False, "move_enable": False, "emergency_stop": True}
-    stream.add({"in": levels, "out": {"alarm_stop": False}, "mode": "EMERGENCY_STOP"})
+    failed = {"label": "p", "kind": "regional", "event": "failed", "at": [7, 31], "note": "off it"}
+    stopped = {"in": levels, "out": {"alarm_stop": False}, "mode": "EMERGENCY_STOP"}
+    stream.add({**stopped, "step": failed})
     said = "document.getElementById('standing').textContent"
     page.wait(f"{said}.includes('stop pressed')")
+    assert page.run(f"{said}.includes('Step 7 of 31, p, failed: off it.')")
+    assert page.run("document.getElementById('hold').disabled")
+    assert page.run("document.getElementById('link').textContent") == "live, stopped"
+    assert page.run("document.getElementById('outputs').textContent").count("stopactive") == 1
+    assert page.run("document.getElementById('stopping').textContent.includes('no safety')")
     assert page.run(f"{STOP}.getAttribute('aria-pressed')") == "true"
     page.run("scrollTo({top: 0, behavior: 'instant'})")
     page.frame()

@@ -148,7 +148,7 @@ class Recorded:
         self.analysis = analyse(read_recording(name))
         self.folder = Path(name).parent
         self.stem = Path(name).stem
-        self.source = f"recording {name}"
+        self.source = f"recording {Path(name).name}"
         self.text = self.analysis.recording.cell_yaml
         if self.analysis.cell is None:
             words = "; ".join(self.analysis.problems) or "it holds no cell"

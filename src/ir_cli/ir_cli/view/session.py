@@ -396,16 +396,21 @@ class Session:
         self._motion = None
         self._draw(recorded_content(content, stage.cell))
         recording = analysis.recording
+        driven = driven_tiles(analysis)
         tiles: list[Json] = [
-            [tile.name, tile.value, "; ".join(filter(None, tile.notes))]
-            for tile in driven_tiles(analysis)
+            [tile.name, tile.value, "; ".join(filter(None, tile.notes[:1]))] for tile in driven
         ]
         kind = "Simulated, not measured" if recording.origin == "simulated" else "Measured"
-        said = "The recording as it was driven; Plan again plans its cell."
+        said = "The recording as it was driven."
         if recording.only_planned:
             kind = PREDICTED
-            said = "The plan as it was written; Plan again plans its cell."
-        lines: list[Json] = [said]
+            said = "The plan as it was written."
+        notes = [
+            f"{tile.name}: {'; '.join(filter(None, tile.notes[1:]))}."
+            for tile in driven
+            if any(tile.notes[1:])
+        ]
+        lines: list[Json] = [said, *notes]
         self._say(
             origin=kind,
             recorded=True,

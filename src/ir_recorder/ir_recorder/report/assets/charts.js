@@ -419,6 +419,7 @@ class ClearanceChart extends TimeChart {
     super(canvas, timeline, tip);
     this.bound = data.safetyDistance;
     this.parts = data.clearance.map((c) => ({ time: floats(c.time), low: floats(c.low), label: c.label }));
+    this.load = data.lanes.find((lane) => lane.label === "load");
     this.most = 0.3;
     for (const part of this.parts) for (const d of part.low) this.most = Math.max(this.most, d);
     this.most = Math.min(this.most, 0.8);
@@ -445,9 +446,26 @@ class ClearanceChart extends TimeChart {
       g.stroke();
       g.lineWidth = 1;
     }
+    this.contacts(g);
     g.restore();
     this.named(g, `safety distance ${+(this.bound * 1000).toFixed(1)} mm`, y(this.bound));
     this.cursor(g);
+  }
+  /* Between two curves the load may change: the hand touches the part, and no distance is drawn. */
+  contacts(g) {
+    const held = (part) => ((this.load ? this.load.spans : []).find(([from, to]) => from <= part.middle && part.middle <= to) || [0, 0, ""])[2];
+    const known = this.parts.map((part) => ({ from: part.time[0], to: part.time[part.time.length - 1], middle: (part.time[0] + part.time[part.time.length - 1]) / 2 }));
+    let free = this.left;
+    g.textAlign = "center";
+    g.fillStyle = css("--soft");
+    for (let k = 1; k < known.length; k++) {
+      const before = held(known[k - 1]), after = held(known[k]), middle = this.x((known[k - 1].to + known[k].from) / 2);
+      if (before === after) continue;
+      const words = after.length > before.length ? "grips" : "releases", wide = g.measureText(words).width;
+      if (middle - wide / 2 < free || middle + wide / 2 > this.width) continue;
+      g.fillText(words, middle, this.top + 8);
+      free = middle + wide / 2 + 4;
+    }
   }
   describe(time) {
     const part = this.parts.find((p) => time >= p.time[0] && time <= p.time[p.time.length - 1]);

@@ -106,6 +106,7 @@ class LivePowerChart extends PowerChart {
 class LiveClearanceChart extends ClearanceChart {
   show(history, bound) {
     this.bound = bound;
+    this.load = history.lanes.get("load");
     this.parts = [];
     let part = null;
     for (const r of history.records) {
@@ -170,7 +171,7 @@ class LiveClearanceChart extends ClearanceChart {
   const link = () => {
     const heard = (history.last || {}).heard || {}, silent = performance.now() - heardAt > 3000;
     const lost = !connected || silent;
-    const [words, kind] = lost ? ["connection lost", "bad"] : heard.driver ? ["live", "good"] : ["no driver heard", "open"];
+    const [words, kind] = lost ? ["connection lost", "bad"] : heard.driver ? (isStopped(history.last) ? ["live, stopped", "bad"] : ["live", "good"]) : ["no driver heard", "open"];
     find("link").textContent = words;
     find("link").className = `verdict ${kind}`;
     const missing = ["planner", "runner"].filter((name) => !heard[name]);

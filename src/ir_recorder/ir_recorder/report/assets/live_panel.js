@@ -7,10 +7,11 @@ const element = (tag, words = "", name = "") => {
   if (name) made.className = name;
   return made;
 };
+const STOP_WORDS = { alarm_stop: ["active", "none"] }; /* of bits whose 1 says that nothing is wrong */
 const modeWords = (name) => (name || "").toLowerCase().replace(/_/g, " ");
 const BIT_WORDS = { ab: "drive bus off", hib: "hibernate", ks: "cold start", emergency_stop: "emergency stop", drives_on: "drives on",
   drives_off: "drives off", conf_mess: "confirm messages", move_enable: "move enable", bbs: "ready to operate", drives_ready: "drives ready",
-  alarm_stop: "no emergency stop", in_home: "at machine home", moving: "moving" };
+  alarm_stop: "emergency stop", in_home: "at machine home", moving: "moving" };
 
 /* Figures that a person looks for first: name, value, what explains it, and whether it is bad. */
 function figures(state, energy) {
@@ -20,7 +21,7 @@ function figures(state, energy) {
   return [
     ["power at the mains", watts, energy === null ? "" : `${energy >= 3.6e6 ? `${(energy / 3.6e6).toFixed(2)} kWh` : `${(energy / 3600).toFixed(1)} Wh`} since this page was opened`],
     ["mode", state.w ? modeWords(state.mode) || "–" : "–", target],
-    ["step of the program", step ? step.label : "–", step ? [total, step.event === "started" ? "runs" : step.event, step.note].filter(Boolean).join(", ") : "no program was run"],
+    ["step of the program", step ? step.label : "–", step ? [total, step.event === "started" ? "runs" : step.event, step.event === "failed" ? "" : step.note].filter(Boolean).join(", ") : "no program was run"],
     ["nearest pair", near ? `${(near[0] * 1000).toFixed(0)} mm` : "–", near ? `${near[7]}${short ? `, below the safety distance of ${+(state.bound * 1000).toFixed(1)} mm` : ""}` : "", short],
     ["load", state.load === "none" ? "nothing" : state.load || "–", state.driving && state.scaling !== null && state.scaling < 1 ? `speed ${Math.round(state.scaling * 100)} %` : ""],
   ];
@@ -40,12 +41,15 @@ function showFigures(place, rows) {
 }
 
 /* What the bits of stop and hold mean for the robot, and what ends it; "" where it may move. */
+const failure = ({ step }) => (step && step.event === "failed"
+  ? `Step ${step.at[0]} of ${step.at[1]}, ${step.label}, failed${step.note ? `: ${step.note}` : ""}.` : "");
 const isStopped = (state) => Boolean((state.in || {}).emergency_stop) || (state.out || {}).alarm_stop === false;
 function standing(state) {
   const levels = state.in || {};
-  if (levels.emergency_stop) return "Emergency stop pressed: motors off, brakes closed. Press it again to release it.";
-  if (isStopped(state)) return "Stopped, the button released: confirm messages, then drives on.";
-  return levels.move_enable === false ? "Held on the path. Press hold again to go on." : "";
+  let words = levels.move_enable === false ? "Held on the path. Press hold again to go on." : "";
+  if (isStopped(state)) words = "Stopped, the button released: confirm messages, then drives on.";
+  if (levels.emergency_stop) words = "Emergency stop pressed: motors off, brakes closed. Press it again to release it.";
+  return [words, failure(state)].filter(Boolean).join(" ");
 }
 
 /* Buttons and lamps of bits, made when a bit is heard of first; stop and hold are there from the beginning. */
@@ -67,7 +71,7 @@ class Bits {
     }
     this.stop.disabled = !token; /* whoever is silent may still hear it */
     this.stop.setAttribute("aria-pressed", String(Boolean(state.in && state.in.emergency_stop)));
-    this.hold.disabled = !allowed || !state.in;
+    this.hold.disabled = !allowed || !state.in || isStopped(state);
     this.hold.setAttribute("aria-pressed", String(Boolean(state.in && state.in.move_enable === false)));
   }
   bit(side, place, name, level, allowed) {
@@ -84,12 +88,12 @@ class Bits {
       place.append(made);
       this.made.set(key, made);
     }
-    const made = this.made.get(key), value = made.querySelector("b"), words = typeof level === "boolean" ? (level ? "1" : "0") : level;
+    const made = this.made.get(key), value = made.querySelector("b"), words = typeof level === "boolean" ? (STOP_WORDS[name] || ["0", "1"])[Number(level)] : level;
     if (value.textContent !== words) value.textContent = words;
     if (switchable) {
       made.setAttribute("aria-pressed", String(level));
       made.disabled = !allowed;
-    } else made.classList.toggle("on", level === true);
+    } else made.classList.toggle("on", level === !STOP_WORDS[name]);
   }
 }
 

@@ -1,6 +1,8 @@
 "use strict";
 /* A cell that is planned or replayed: shows what the server sends, and asks for what a hand does. */
 
+const ROOM = 560; /* px wide, below which names of stations would hide the robot */
+
 /* The cell with its robot in the motion, or where a hand put it; machines stand where they were moved to. */
 class CellMotion extends Motion {
   constructor(canvas, timeline, scene, state) {
@@ -48,7 +50,7 @@ class CellMotion extends Motion {
     this.view = view;
     this.box = box;
     const all = this.labels;
-    this.labels = all.filter((label) => (label.station ? this.show.stations : true) && this.show.names);
+    this.labels = all.filter((label) => (label.station ? this.show.stations && box.width >= ROOM : true) && this.show.names);
     for (const label of all) if (!this.labels.includes(label)) label.element.hidden = true;
     super.placeLabels(view, box);
     this.labels = all;
@@ -169,6 +171,7 @@ async function events(url, headers, take) {
     power.take(shown.lanes || []);
     laneKey(find("lane-key"), shown.lanes || []);
     clearance.parts = (shown.clearance || []).map((c) => ({ time: floats(c.time), low: floats(c.low), label: c.label }));
+    clearance.load = (shown.lanes || []).find((lane) => lane.label === "load");
     clearance.bound = shown.safetyDistance;
     for (const part of document.querySelectorAll("#clearance")) {
       part.parentElement.hidden = part.parentElement.previousElementSibling.hidden = !clearance.parts.length;
@@ -306,8 +309,7 @@ async function events(url, headers, take) {
     find("progress").hidden = find("cancel").hidden = plan.state !== "planning";
     find("progress").value = plan.share || 0;
     for (const id of ["plan", "compare"]) find(id).disabled = plan.state === "planning" || !token;
-    find("recorded").hidden = !state.recorded;
-    find("recorded").setAttribute("aria-pressed", String(plan.state === "recorded"));
+    find("recorded").hidden = !state.recorded || plan.state === "recorded";
     find("stations").replaceChildren(...(state.stations || []).map(([station, load, words, good, why]) => {
       const item = element("li"), button = element("button", "", good ? "good" : "bad");
       button.type = "button";
