@@ -398,19 +398,16 @@ class Session:
         recording = analysis.recording
         driven = driven_tiles(analysis)
         tiles: list[Json] = [
-            [tile.name, tile.value, "; ".join(filter(None, tile.notes[:1]))] for tile in driven
+            [tile.name, tile.value, "; ".join(filter(None, tile.notes[: None if k else 1]))]
+            for k, tile in enumerate(driven)
         ]
         kind = "Simulated, not measured" if recording.origin == "simulated" else "Measured"
         said = "The recording as it was driven."
         if recording.only_planned:
             kind = PREDICTED
             said = "The plan as it was written."
-        notes = [
-            f"{tile.name}: {'; '.join(filter(None, tile.notes[1:]))}."
-            for tile in driven
-            if any(tile.notes[1:])
-        ]
-        lines: list[Json] = [said, *notes]
+        more = "; ".join(filter(None, driven[0].notes[1:]))
+        lines: list[Json] = [said, *([f"Energy: {more}."] if more else [])]
         self._say(
             origin=kind,
             recorded=True,
