@@ -20,7 +20,7 @@ from ir_studies.arena.figures import (
     figures,
     success_over_time,
 )
-from ir_studies.arena.page import verdict
+from ir_studies.arena.page import page_html, verdict
 from ir_studies.arena.runs import FinishedArena
 from ir_studies.arena.settings import ArenaEntry, ArenaSettings
 
@@ -121,7 +121,7 @@ def test_the_page_says_by_itself_where_the_portfolio_is_beaten() -> None:
         [*mine, run("sbl", "1", 90.0, 0.1, 0.5), run("sbl", "2", math.nan, 0.0, 0.0)], settings
     )
     assert (
-        "open: J below the portfolio&#x27;s, in the median of the runs that both solved: sbl "
+        "open: cost below the portfolio&#x27;s, in the median of the runs that both solved: sbl "
         "10.00 % (lower in 1 of 1)" in said
     )
     assert "solved" not in said.partition("runs that both solved")[2]
@@ -133,6 +133,19 @@ def test_the_page_says_by_itself_where_the_portfolio_is_beaten() -> None:
     assert "open: sbl solved 1 of 1, the portfolio 0." in verdict(more, settings)
 
 
+def test_the_page_says_first_who_won_and_what_that_means() -> None:
+    settings = ArenaSettings(cells=("open",), planners=("portfolio", "sbl"))
+    runs = [run(name, "1", 100.0, 0.1, 0.5) for name in settings.planners]
+    page = page_html(runs, settings)
+    assert page.index("The winner is portfolio: it solved 1 of 1 runs") < page.index('class="tile"')
+    assert "in joules: energy of the drives + each robot's own price [W] x seconds" in page
+    assert " J above" not in page
+    assert "no planner need be named" in page
+    assert "drives + 80 W x" in page_html(runs, replace(settings, time_value=80.0))
+    runs[1] = run("sbl", "1", 90.0, 0.1, 0.5)
+    assert "sbl may be named instead of the default, portfolio" in page_html(runs, settings)
+
+
 def test_free_questions_do_not_hide_where_the_portfolio_is_beaten() -> None:
     settings = ArenaSettings(cells=("open",), planners=("portfolio", "sbl"))
     free = [
@@ -141,7 +154,9 @@ def test_free_questions_do_not_hide_where_the_portfolio_is_beaten() -> None:
         for one in (run(planner, str(k), 50.0, 0.1, 0.5) for k in range(7))
     ]
     blocked = [run("portfolio", "b", 100.0, 0.1, 0.5), run("sbl", "b", 90.0, 0.1, 0.5)]
-    lower = "J below the portfolio&#x27;s, in the median of the runs that both solved: sbl 10.00 %"
+    lower = (
+        "cost below the portfolio&#x27;s, in the median of the runs that both solved: sbl 10.00 %"
+    )
     assert f"open: {lower}" in verdict([*free, *blocked], settings)
     cheaper = [
         replace(r, row={**r.row, "cost_j": 45.0}) if r.entry.planner == "sbl" else r for r in free

@@ -114,6 +114,13 @@ def test_what_is_left_behind(laid: Laid, tmp_path: Path) -> None:
     page = (tmp_path / "out" / "index.html").read_text()
     assert "https://" not in page
     assert "{{" not in page
+    lead = page.partition('id="lead"')[2].partition("</section>")[0]
+    assert "The best placement saves" in lead or "leave everything where it stands" in lead
+    assert " EUR a year" in lead or "leave everything" in lead
+    assert (
+        page.count('class="given"') > page.partition('class="maps"')[0].count('class="given"') > 0
+    )
+    assert "of a cycle as given are all energy at the mains" in page
     assert "station infeed_pick is too far" in page
     table = list(csv.DictReader(found.table.splitlines()))
     assert [row["rank"] for row in table] == ["0", "0", "1", "1", "2", "2"]
@@ -187,7 +194,8 @@ def test_only_the_given_placement(laid: Laid) -> None:
 
 def test_why_the_others_were_not_planned(laid: Laid) -> None:
     by_bound = laid(replace(GRID, plans=100), "a").summary
-    assert re.search(r"each of the \d\d that were planned, by more than 1 % of these", by_bound)
+    said = r"the coarse cost of any of the \d\d planned, less 1 % of that, they would cost more"
+    assert re.search(said, by_bound)
     assert "at most 16 plans were asked for" in laid(replace(GRID, plans=16), "b").summary
 
 

@@ -10,7 +10,14 @@ import pytest
 
 from ir_recorder.report.number_text import DASH
 from ir_studies.statistics.findings import NO_PAIR, NOT_DRIVEN, failures_of, findings_of
-from ir_studies.statistics.outputs import FEW, page_html, percent, summary_of, summed_up
+from ir_studies.statistics.outputs import (
+    FEW,
+    page_html,
+    percent,
+    prediction_words,
+    summary_of,
+    summed_up,
+)
 from ir_studies.statistics.settings import DRAWN, StatisticsSettings
 
 ASKED = StatisticsSettings("open")
@@ -79,8 +86,30 @@ def test_a_mean_stands_beside_its_interval() -> None:
 def test_figures_that_differ_by_rounding_are_alike() -> None:
     rows = pairs(*(1e-14 * k for k in range(1, 40)), column="movement_cost")
     found = findings_of(rows)
-    cost = next(each for each in found.comparisons if each.name.startswith("W "))
+    cost = next(each for each in found.comparisons if each.name == "movement cost")
     assert (cost.less, cost.more, cost.outside, cost.shown) == (0, 0, False, False)
+
+
+@pytest.mark.parametrize(
+    ("shares", "words"),
+    [
+        ((0.0, 0.05, 0.1), "The planner predicts 7.2 % too low an energy in the mean (too low in"),
+        ((-0.5, -0.4), "too high an energy"),
+        ((), ""),
+    ],
+)
+def test_the_page_says_first_how_far_the_prediction_is_off(
+    shares: tuple[float, ...], words: str
+) -> None:
+    found = findings_of(pairs(*shares))
+    said = prediction_words(found)
+    assert words in said
+    assert bool(said) == bool(shares)
+    page = page_html(found, ASKED)
+    assert ('id="lead"' in page) == bool(shares)
+    if shares:
+        assert f"of {2 * len(shares)} measured energies lie in its 90 % interval." in said
+        assert page.index(said) < page.index('class="tile"')
 
 
 @pytest.mark.parametrize("shares", [(), (0.1,), (0.1, 0.1), (0.0, 0.0)])

@@ -32,6 +32,7 @@ def page(kind: str, parts: Mapping[str, str], button: str = "") -> str:
         "style": asset("page.css"),
         "own_style": (own / "page.css").read_text("utf-8"),
         "badge": "",
+        "lead": "",
         "main": _filled((own / "page.html").read_text("utf-8"), parts),
     }
     return _filled(shell, {"button": button, **inner, **parts})
@@ -41,6 +42,11 @@ def badge(words: str, *, good: bool) -> str:
     """The verdict of a study beside its title: green, or open."""
     style = "good" if good else "open"
     return f'<div class="badges"><p class="verdict {style}">{text(words)}</p></div>'
+
+
+def lead(words: str) -> str:
+    """What a study found, in plain words above all figures."""
+    return f'<section id="lead"><p>{text(words)}</p></section>\n'
 
 
 def settings_table(settings: Mapping[str, Any]) -> str:

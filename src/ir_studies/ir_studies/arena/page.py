@@ -13,11 +13,13 @@ from scipy.spatial import ConvexHull
 
 from ir_description import Cell, is_path, load_cell
 from ir_kernels import Chain
+from ir_msgs_py.options import ROBOTS_TIME_VALUE
 from ir_planner.search import SEARCHES
 from ir_planner.search.with_ompl import needs_ompl
 from ir_recorder.report.bars import Piece, Row, bars
 from ir_recorder.report.charts import Point, front_chart
 from ir_recorder.report.files import write_output
+from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import DASH, joules, millimetres, percent, seconds, text
 from ir_recorder.report.page import PAGE_START, asset
 from ir_recorder.report.paid import Tile, row_of
@@ -38,7 +40,7 @@ from ir_studies.arena.figures import (
     success_over_time,
 )
 from ir_studies.arena.settings import PORTFOLIO, ArenaSettings, settings_text
-from ir_studies.page import BUTTON, badge, page
+from ir_studies.page import BUTTON, badge, lead, page
 from ir_values.arrays import FloatArray
 from ir_values.files import ANYWHERE
 
@@ -107,11 +109,11 @@ def _view() -> tuple[FloatArray, FloatArray, FloatArray]:
 
 SCRIPTS = ("charts.js", "axes.js", "export.js", "compare.js")
 _HEADS = (
-    "planner", ">solved", ">first answer", ">best answer", ">J above the best", ">W above the least",  # noqa: E501
+    "planner", ">solved", ">first answer", ">best answer", ">cost above the best", ">movement cost above the least",  # noqa: E501
     ">duration", ">energy", ">clearance", ">lost",
 )  # fmt: skip
 _NAMED = 3  # planners, of those that are alike
-_TIE = 5e-5  # of J: less is not shown
+_TIE = 5e-5  # of the cost: less is not shown
 # percent: what a curve of costs shows where nothing, or something more expensive, is known
 _ABOVE = 25.0
 _BLOCKED = "The straight movement is blocked"
@@ -138,6 +140,8 @@ def page_html(runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int = 
         "title": "Arena",
         "subtitle": text(_subtitle(runs, settings, missing)),
         "badge": _badge(runs, settings),
+        "lead": _lead(every, runs, settings),
+        "time_value": _second(settings.time_value),
         "tiles": _tiles(every),
         "solved": _solved_bars(every),
         "verdict": verdict(runs, settings),
@@ -172,6 +176,33 @@ def _subtitle(runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int) -
     counts |= {"question": questions, "seed": settings.seeds}
     asked = ", ".join(f"{count} {word}{'s' if count > 1 else ''}" for word, count in counts.items())
     return f"{asked}: {made} of {settings.seconds:g} s of processor"
+
+
+def _second(time_value: float) -> str:
+    """What a second costs [W] in words."""
+    return "each robot's own price [W]" if time_value == ROBOTS_TIME_VALUE else f"{time_value:g} W"
+
+
+def _lead(found: Sequence[Figures], runs: Sequence[ArenaRun], settings: ArenaSettings) -> str:
+    """What was asked, who won, and what that means for the choice of a planner."""
+    known = [one for one in found if one.solved]
+    if not known:
+        return lead("No planner solved any run.")
+    asked = len({run.entry.question for run in runs})
+    best = max(known, key=lambda one: (one.success, -one.cost_ratio))
+    above = 100.0 * (best.cost_ratio - 1.0)
+    said = (
+        f"{counted(len(found), 'planner')} had {settings.seconds:g} s of processor for each of "
+        f"{counted(asked, 'movement')} between two places. The winner is {best.planner}: it "
+        f"solved {best.solved} of {best.count} runs, and of those that solved most its "
+        f"trajectories cost least, in the median {above:.2f} % above the best known."
+    )
+    if not _judged(settings):
+        return lead(said)
+    means = f"In cells like these {best.planner} may be named instead of the default, {PORTFOLIO}."
+    if best.planner == PORTFOLIO:
+        means = "It is the default: in cells like these no planner need be named."
+    return lead(f"{said} {means}")
 
 
 def _bindings(runs: Sequence[ArenaRun], planners: Sequence[str]) -> str:
@@ -239,8 +270,8 @@ def verdict(runs: Sequence[ArenaRun], settings: ArenaSettings) -> str:
     whole = all(of_cell(runs, cell) for cell in settings.cells)
     place = "In no cell" if whole else "In no cell that has runs"
     held = (
-        f"{place} did anybody solve more than the portfolio, or have a lower median J where both "
-        "solved."
+        f"{place} did anybody solve more than the portfolio, or have a lower median cost where "
+        "both solved."
     )
     items = "".join(f"<li>{text(words)}</li>" for words in behind(runs, settings) or [held])
     return (
@@ -257,7 +288,7 @@ def _solved_bars(found: Sequence[Figures]) -> str:
             f"{one.solved} of {one.count}",
             (
                 f"first answer {milliseconds(one.first)}",
-                f"J {percent(one.cost_ratio - 1.0)} above the best",
+                f"cost {percent(one.cost_ratio - 1.0)} above the best",
             ),
         )
         for one in sorted(found, key=lambda one: (-one.solved, one.cost_ratio))
@@ -282,7 +313,9 @@ def _tiles(found: Sequence[Figures]) -> str:
         Tile("most runs solved", f"{best[0].solved} of {best[0].count}", (f"{names}{more}",)),
         Tile("soonest first answer", milliseconds(soonest.first), (soonest.planner, among)),
         Tile(
-            "least J above the best", percent(cheapest.cost_ratio - 1.0), (cheapest.planner, among)
+            "least cost above the best",
+            percent(cheapest.cost_ratio - 1.0),
+            (cheapest.planner, among),
         ),
         Tile("least clearance", millimetres(min(one.clearance for one in known)), ("of all runs",)),
     )
@@ -290,7 +323,7 @@ def _tiles(found: Sequence[Figures]) -> str:
 
 
 def _against(own: Sequence[ArenaRun], place: str, settings: ArenaSettings) -> Iterator[str]:
-    """Who solved more than the portfolio, and all whose J is lower in one sentence."""
+    """Who solved more than the portfolio, and all whose cost is lower in one sentence."""
     found = {planner: figures(planner, own) for planner in settings.planners}
     mine = found[PORTFOLIO]
     lower = []
@@ -306,7 +339,7 @@ def _against(own: Sequence[ArenaRun], place: str, settings: ArenaSettings) -> It
             lower.append(f"{planner} {less} (lower in {against.lower} of {against.both})")
     if lower:
         yield (
-            f"{place}: J below the portfolio's, in the median of the runs that both solved: "
+            f"{place}: cost below the portfolio's, in the median of the runs that both solved: "
             f"{', '.join(lower)}."
         )
 
@@ -374,7 +407,7 @@ def _curves(
     ]
     kinds: tuple[tuple[str, Callable[..., FloatArray], float, float], ...] = (
         ("solved", success_over_time, 100.0, 0.0),
-        ("J above the best known, median", cost_over_time, _ABOVE, _ABOVE),
+        ("cost above the best known, median", cost_over_time, _ABOVE, _ABOVE),
     )
     for name, compute, most, missing in kinds:
         for place, own in places if len(titles) > 1 else places[:1]:

@@ -37,7 +37,7 @@ from ir_studies.layout.placement import Known, Variable
 from ir_studies.layout.search import GIVEN
 from ir_studies.layout.settings import LayoutSettings, PlacementCondition
 from ir_studies.layout.summary import Final, cost_words, ends, of_condition, sentences
-from ir_studies.page import page, settings_table
+from ir_studies.page import lead, page, settings_table
 from ir_values.arrays import FloatArray
 from ir_values.files import ANYWHERE
 
@@ -79,6 +79,21 @@ def shown_range(known: Sequence[Known]) -> tuple[float, float]:
     return (min(costs), float(np.quantile(costs, 0.9))) if costs else (math.nan, math.nan)
 
 
+_MARKS = (
+    ("open", "looked at only: estimated"),
+    ("cross", "impossible"),
+    ("given", "as given"),
+    ("best", "best_1.yaml"),
+)
+"""Marks whose kind says what they mean, and what."""
+
+
+def _key(kind: str) -> str:
+    """The mark as the drawings have it, beside its words."""
+    drawn = mark(0.0, 0.0, kind, "var(--soft)", "")
+    return f'<svg class="cost key" viewBox="-9 -9 18 18" aria-hidden="true">{drawn}</svg>'
+
+
 def legend(low: float, high: float) -> str:
     """What the colours mean."""
     steps = np.linspace(low, high, len(_COLOURS) + 1)
@@ -89,8 +104,8 @@ def legend(low: float, high: float) -> str:
         for one, at in zip(_COLOURS, steps, strict=False)
         if math.isfinite(low)
     )
-    rest = ("○ looked at only: estimated", "× impossible", "◆ as given", "★ best_1.yaml")
-    return f'<p class="key-row">{"".join(keys)}{"".join(f"<span>{one}</span>" for one in rest)}</p>'
+    rest = "".join(f"<span>{_key(kind)}{words}</span>" for kind, words in _MARKS)
+    return f'<p class="key-row">{"".join(keys)}{rest}</p>'
 
 
 class PlanView:
@@ -215,16 +230,51 @@ def page_html(
         "tiles": _tiles(known, finals, costs),
         "bars": _bars(finals),
         "assumed": assumed_section(costs),
+        "badge": '<div class="badges"><p class="source open">Predicted, not driven</p></div>',
+        "lead": _lead(finals, costs),
         "verdict": f"<ul>{said}</ul>",
         "best": table(_HEADS, _rows(finals), "The best placements"),
         "map": "".join(_maps(known, finals, settings, cell)),
         "cost": text(cost_words(settings)),
+        "beside": _beside(finals, settings),
         "legend": legend(*shown_range(known)),
         "variables": "".join(_charts(known, finals, settings)),
         "impossible": _impossible(known),
         "settings": settings_table(asdict(settings)),
     }
     return page("layout", parts)
+
+
+def _lead(finals: Sequence[Sequence[Final]], costs: Costs) -> str:
+    """Whether moving anything pays, in money of a year; "" where there is nothing to compare."""
+    given, best = ends(finals)
+    if given is None or best is None:
+        return ""
+    like = of_condition(given, best[0])
+    less, within = best[0].saving(like)
+    year = costs.money(less * costs.cycles_per_year(like.mean("duration_s")))
+    span = span_of(within.low, within.high, kilowatt_hours)
+    saved = f"{kilowatt_hours(less)} of {kilowatt_hours(like.mean())} a cycle, {span}"
+    if less <= 0.0 or within.low <= 0.0:
+        return lead("No placement is shown to save energy: leave everything where it stands.")
+    said = f"The best placement saves {yearly_money(year, costs.currency)} a year ({saved})"
+    if year < costs.engineer_hour:
+        hour = f"{costs.engineer_hour:g} {costs.currency}"
+        return lead(f"{said}, less than one hour of an engineer ({hour}): nothing is worth moving.")
+    return lead(f"{said}.")
+
+
+def _beside(finals: Sequence[Sequence[Final]], settings: LayoutSettings) -> str:
+    """Why what placements are compared by is less than the energy of a cycle."""
+    given, _ = ends(finals)
+    if given is None or all(settings.cycle_times):
+        return ""
+    cycle = kilowatt_hours(given[0].mean())
+    return (
+        '<p class="hint">That is of the movements alone, without pauses and without what the '
+        f"controller takes. The {text(cycle)} of a cycle as given are all energy at the mains, "
+        "pauses included.</p>"
+    )
 
 
 def _bars(finals: Sequence[Sequence[Final]]) -> str:

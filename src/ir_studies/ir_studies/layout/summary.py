@@ -173,15 +173,16 @@ def bound_words(planned: int, settings: LayoutSettings) -> str:
     """Why the others were not planned. planned: how many were, the impossible among them."""
     if settings.plans and planned >= settings.plans:
         return f"The others were not planned: at most {settings.plans} plans were asked for."
-    by = f", by more than {100 * settings.margin:g} % of these" if settings.margin > 0.0 else ""
+    by = f", less {100 * settings.margin:g} % of that," if settings.margin > 0.0 else ""
+    end = f"any of the {planned} planned{by} they would cost more than the best."
     if settings.in_cycles:
         return (
-            "One of the others can be the best only if it lies further below the line of joules "
-            f"over what coarse movements cost than each of the {planned} that were planned{by}."
+            "The others were not planned in full: even as far below what their coarse movements "
+            f"let expect as {end}"
         )
     return (
-        "One of the others can be the best only if its plan costs less above its coarse "
-        f"movements than each of the {planned} that were planned{by}."
+        "The others were not planned in full: even with the least that planning added to the "
+        f"coarse cost of {end}"
     )
 
 
@@ -223,11 +224,13 @@ def against(best: Final, given: Final) -> str:
     sure = "" if low > 0.0 else "; zero lies in it: it is open whether anything is saved"
     moving = 1.0 - best.mean("moving_j") / given.mean("moving_j")
     change = f"{percent(abs(moving)).lstrip('+')} {'less' if moving >= 0.0 else 'more'}"
+    took = seconds(given.mean("duration_s"))
+    takes = seconds(best.mean("duration_s"))
+    pace = "as long as before" if takes == took else f"{takes} instead of {took}"
     return (
         f"the given one {kilowatt_hours(given.mean())}. It {does} {kilowatt_hours(sign * less)}, "
         f"{percent(sign * less / given.mean()).lstrip('+')} (90 % interval {between}{sure}); the "
-        f"movements alone take {change}. A cycle takes {seconds(best.mean('duration_s'))} instead "
-        f"of {seconds(given.mean('duration_s'))}."
+        f"movements alone take {change}. A cycle takes {pace}."
     )
 
 

@@ -96,7 +96,7 @@ NATURAL = (
     ("energy, indirect", "indirect_j", "J"),
     ("peak power", "peak_w", "W"),
     ("path of the tcp", "path_m", "m"),
-    ("W of eq. (9)", "movement_cost", ""),
+    ("movement cost", "movement_cost", ""),
     ("largest torque share", "torque_share", ""),
 )
 """Natural values of section VI: what can be read off a movement, the column that holds it, and its

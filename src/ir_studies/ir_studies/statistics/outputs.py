@@ -17,7 +17,7 @@ from ir_recorder.report.page import PAGE_START
 from ir_recorder.report.paid import Tile, row_of
 from ir_recorder.report.step_table import write_columns
 from ir_recorder.report.tables import table
-from ir_studies.page import badge, page, settings_table
+from ir_studies.page import badge, lead, page, settings_table
 from ir_studies.statistics.findings import ASYNCHRONOUS, SYNCHRONOUS, Comparison, Findings, number
 from ir_studies.statistics.settings import DRAWN, StatisticsSettings
 from ir_studies.work import Row
@@ -104,6 +104,9 @@ def _line(each: Comparison, top: float, at: Callable[[float], float]) -> str:
         for k, value in enumerate(each.values.tolist())
     )
     label = f'<text class="name" x="0" y="{y + 4.0:.1f}">{text(each.name)}</text>'
+    middle = at(each.mean.value)
+    ends = f'y1="{y - _BAR / 2.0:.1f}" y2="{y + _BAR / 2.0:.1f}"'
+    marks += f'<line class="mean" x1="{middle:.1f}" x2="{middle:.1f}" {ends}/>'
     if math.isnan(each.mean.low):
         return label + marks
     x = at(each.mean.low)
@@ -301,16 +304,44 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
         "agreement_dots": dots(
             found.agreements, "predicted or indirect less direct, in percent of direct"
         ),
+        "lead": _lead(found),
         "settings": settings_table(settings.budget),
     }
     return page("statistics", parts)
 
 
+def _lead(found: Findings) -> str:
+    words = prediction_words(found)
+    return lead(words) if words else ""
+
+
 def _badge(found: Findings) -> str:
     shown = sum(each.shown for each in found.comparisons)
     if not shown:
-        return badge("No difference shown", good=False)
-    return badge(f"{counted(shown, 'difference')} shown", good=True)
+        return badge("Timings: no difference shown", good=False)
+    return badge(f"Timings: {counted(shown, 'difference')} shown", good=True)
+
+
+def prediction_words(found: Findings) -> str:
+    """How far and in which direction predicted energies lie from measured ones, and how often the
+    measured one lies in the interval; "" where none was measured.
+    """
+    each = next((one for one in found.agreements if one.name.startswith("predicted")), None)
+    if each is None or not math.isfinite(each.mean.value):
+        return ""
+    low = each.mean.value < 0.0
+    side = "low" if low else "high"
+    size = significant(abs(each.mean.value), 2)
+    often = f"too {side} in {each.less if low else each.more} of {each.count} movements"
+    said = f"The planner predicts {size} % too {side} an energy in the mean ({often})"
+    if abs(each.mean.value) < ALIKE:
+        said = "The planner predicts the energy without a difference in the mean"
+    elif math.isfinite(each.mean.low) and not each.outside:
+        said += ", which may be chance"
+    if math.isfinite(found.covered):
+        inside = round(found.covered * found.driven)
+        said += f"; {inside} of {found.driven} measured energies lie in its 90 % interval"
+    return f"{said}."
 
 
 def _tiles(found: Findings) -> list[Tile]:
