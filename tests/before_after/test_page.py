@@ -16,6 +16,7 @@ from ir_cli.compare import row_of
 from ir_cli.main import main
 from ir_msgs_py.savings import BeforeAfter
 from ir_planner import Planner
+from ir_recorder.analysis.production import home_watts
 from ir_recorder.report.costs import J_PER_KWH, Costs, money
 from ir_recorder.report.number_text import (
     kilograms,
@@ -27,7 +28,9 @@ from ir_recorder.report.number_text import (
 from ir_recorder.report.program_comparison import (
     before_after_columns,
     before_after_html,
+    demand_of,
     write_before_after_table,
+    year_of,
 )
 
 
@@ -61,6 +64,40 @@ def test_the_page_has_both_motions_and_all_figures(compared: BeforeAfter, planne
     assert high.max(axis=0) == pytest.approx(peaks, rel=1e-3)
     for words in ("saved a year", "CO2", "peak power", "pause at point_2", "0.2 EUR/kWh"):
         assert words in page
+
+
+def test_the_headline_has_money_energy_and_co2_of_shifts_and_nights(
+    compared: BeforeAfter, planner: Planner
+) -> None:
+    """Once the money was that of nights too, the energy and CO2 beside it those of shifts alone."""
+    costs = Costs(price=0.27, grid=0.41, demand_price=80.0)
+    page = before_after_html(compared, planner.cell, costs)
+    year = year_of(compared, compared.planned, costs).saved.value
+    power = home_watts(
+        planner.cell, compared.planned.movements[-1].load, planner.cell.robot.controller
+    )
+    night = power["STAND_ON_BRAKES"] - power["HIBERNATION"]
+    joules = year + night * costs.idle_hours * 3600.0
+    shown = (kilowatt_hours(joules), f"{kilograms(costs.co2(joules))} CO2 less a year")
+    assert f"<h2>{money(joules / J_PER_KWH * 0.27, 'EUR')}, {', '.join(shown)}</h2>" in page
+    assert "from the data sheet, not measured" in page
+    assert "1. at night and at weekends" in page
+    assert "2. " in page.split("1. at night and at weekends")[1]
+
+
+def test_the_largest_quarter_of_an_hour_is_compared(
+    compared: BeforeAfter, planner: Planner
+) -> None:
+    page = before_after_html(compared, planner.cell)
+    row = page.split(">largest quarter of an hour</td>")[1].split("</tr>")[0]
+    for side in (compared.today, compared.planned):
+        mean = side.report.energy / side.report.duration
+        assert mean <= demand_of(side) <= side.report.peak_power
+        assert watts(demand_of(side)) in row
+    assert "demand price not given" in row
+    priced = before_after_html(compared, planner.cell, Costs(demand_price=100.0))
+    assert "demand price not given" not in priced
+    assert money(demand_of(compared.planned) / 10.0, "EUR") in priced
 
 
 def test_an_interval_with_zero_in_it_says_so(compared: BeforeAfter, planner: Planner) -> None:

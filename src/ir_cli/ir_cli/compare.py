@@ -233,9 +233,9 @@ def _note(side: Side) -> str:
 
 def _sentences(found: BeforeAfter) -> list[str]:
     changes = [
-        f"{k}. {change.name}: {change.words}: {change.saving.saved:.0f} J less "
+        f"{change.name}: {change.words}: {change.saving.saved:.0f} J less "
         f"({change.saving.saved_low:.0f} to {change.saving.saved_high:.0f})"
-        for k, change in enumerate(found.changes, start=1)
+        for change in found.changes
     ]
     head = [
         f"today: {found.name} ({found.kind}); changes towards: {found.towards}, the least work "

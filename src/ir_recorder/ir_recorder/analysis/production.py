@@ -57,6 +57,10 @@ class Amount:
         """So many of it."""
         return self.of(lambda value: value * count)
 
+    def plus(self, sure: float) -> Amount:
+        """With what has no interval."""
+        return self.of(lambda value: value + sure)
+
     @property
     def doubt(self) -> str:
         """OPEN where zero lies inside the interval of a saving; "" where it does not, or there is
@@ -387,6 +391,16 @@ def idle_watts(analysis: Analysis) -> dict[str, float]:
     ends = [step.load for step in analysis.recording.planned[-1:]]
     ends += [result.step.movement.load for result in analysis.steps[-1:]]
     return home_watts(cell, ends[-1] if ends else NO_LOAD, data)
+
+
+def rest_measured(analysis: Analysis) -> bool:
+    """Whether the powers of rest in the recording's data were measured."""
+    return all_rests_measured(recorded_power_data(analysis.recording, analysis.cell)[0])
+
+
+def all_rests_measured(data: PowerData) -> bool:
+    """Whether a table of measured rests knows each mode that the controller rests in."""
+    return all(data.measured_rest(mode) is not None for mode in REST_MODES)
 
 
 def home_watts(cell: Cell, load: str, data: PowerData) -> dict[str, float]:

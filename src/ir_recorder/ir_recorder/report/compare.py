@@ -19,7 +19,6 @@ from ir_recorder.analysis.production import (
     Amount,
     Production,
     drives_only,
-    idle_watts,
     planned_clearance,
     planned_share,
     production_of,
@@ -33,8 +32,9 @@ from ir_recorder.report.costs import (
     IdleSaving,
     assumed_section,
     counted_with,
-    idle_saving,
     payback,
+    recorded_idle_saving,
+    saved_year,
     yearly_money,
     yearly_span,
 )
@@ -228,7 +228,6 @@ def _year_saved(cycle: Production | None, costs: Costs) -> str:
         cycle.savings.total.change,
         gain.doubt,
         cycle.supply,
-        payback(amount, costs),
     ]
     if price.high > price.low:
         lines.insert(0, f"{yearly_span(price.low, price.high)} {costs.currency}")
@@ -243,7 +242,7 @@ def _around_the_clock(
     known of any.
     """
     found = [
-        None if cycle is None else idle_saving(idle_watts(analysis), costs)
+        None if cycle is None else recorded_idle_saving(analysis, costs)
         for analysis, cycle in zip(analyses, cycles, strict=True)
     ]
     if not any(found):
@@ -251,7 +250,7 @@ def _around_the_clock(
     saved = [None if cycle is None else costs.saving_of_year(cycle) for cycle in cycles]
     nights = (DASH if idle is None else _night(idle, costs) for idle in found)
     both = (
-        DASH if idle is None or amount is None else f"<b>{text(_both(amount, idle, costs))}</b>"
+        DASH if idle is None or amount is None else _both(amount, idle, costs)
         for idle, amount in zip(found, saved, strict=True)
     )
     return [
@@ -265,11 +264,20 @@ def _night(idle: IdleSaving, costs: Costs) -> str:
     return (
         f"<b>{text(yearly_money(idle.saved, costs.currency))}</b>"
         f"<small>{text(today)} with the brakes closed, {text(then)} in {idle.mode}</small>"
+        f"<small>{idle.basis}</small>"
     )
 
 
 def _both(amount: Amount, idle: IdleSaving, costs: Costs) -> str:
-    return yearly_money(costs.money(amount.value) + idle.saved, costs.currency)
+    year = saved_year(amount, idle, costs)
+    word, gain = year.money.gain()
+    price = yearly_money(year.money.value, costs.currency)
+    between = f"{yearly_span(gain.low, gain.high)} {costs.currency}" if gain.low < gain.high else ""
+    energy = year.with_energy(costs)
+    more = f"{energy} more" if word == "more" and energy else energy
+    lines = (between, more, payback(year.money, costs))
+    small = "".join(f"<small>{text(line)}</small>" for line in lines if line)
+    return f"<b>{text(price)}</b>{small}"
 
 
 def _of_line(analysis: Analysis, costs: Costs) -> str:

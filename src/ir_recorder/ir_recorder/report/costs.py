@@ -20,10 +20,10 @@ from ir_recorder.analysis.production import (
     idle_watts,
     levers,
     production_of,
+    rest_measured,
     saved_amount,
 )
 from ir_recorder.errors import RecorderError
-from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import (
     DASH,
     kilograms,
@@ -369,7 +369,7 @@ def money(value: float, currency: str) -> str:
     return f"{shown} {currency}"
 
 
-_NO_CENTS = 100.0  # of a currency: no cents from here on
+_NO_CENTS = 10.0  # of a currency: no cents from here on
 _NOTHING = 0.01  # of a currency, a year: nobody counts less
 _UNSEEN = 1e-4  # of a currency, a part or a shift
 
@@ -398,32 +398,14 @@ def _span_of_money(low: float, high: float, least: float) -> str:
     return span_of(low, high, show)
 
 
-def payback(year: Amount, costs: Costs) -> str:
-    """When the saving of a year [J] has paid an hour of an engineer; "" where it is open whether
+def payback(money: Amount, costs: Costs) -> str:
+    """How many hours of an engineer a saving of a year pays for; "" where it is open whether
     anything is saved, or next to nothing is.
     """
-    saved = costs.money(year.value)
-    if year.doubt or saved < _NOTHING or costs.engineer_hour <= 0.0:
+    if money.doubt or money.value < _NOTHING or costs.engineer_hour <= 0.0:
         return ""
-    years = costs.engineer_hour / saved
-    hour = f"one hour of an engineer ({costs.engineer_hour:g} {costs.currency})"
-    if years > _LONG:
-        return f"{hour} is not paid back within {_LONG:.0f} years"
-    return f"{hour} is paid back in {_span(years)}"
-
-
-_LONG = 20.0  # years: a robot is older by then
-_MONTHS = 12.0
-_SOON = 2.0  # months: shorter spans are said in days
-_LATER = 2.0  # years: longer ones in years
-
-
-def _span(years: float) -> str:
-    if years * _MONTHS < _SOON:
-        return counted(max(round(years * _YEAR), 1), "day")
-    if years < _LATER:
-        return counted(round(years * _MONTHS), "month")
-    return counted(round(years), "year")
+    hours = significant(money.value / costs.engineer_hour, 2)
+    return f"pays for {hours} h of an engineer a year, at {costs.engineer_hour:g} {costs.currency}"
 
 
 def share_between(amount: Amount, whole: float) -> str:
@@ -546,9 +528,9 @@ def lever_section(analysis: Analysis, costs: Costs) -> str:
         )
         for lever in found
     ]
-    idle = idle_saving(idle_watts(analysis), costs)
+    idle = recorded_idle_saving(analysis, costs)
     if idle is not None:
-        words = f"{idle.mode} instead of brakes that are only closed"
+        words = f"{idle.mode} instead of brakes that are only closed, {idle.basis}"
         name = f"at night and at weekends<small>{text(words)}</small>"
         rows.append((idle.saved, name, DASH))
     rows.sort(key=lambda row: -row[0])
@@ -574,10 +556,11 @@ def clock_section(analysis: Analysis, costs: Costs) -> str:
     if cycle is None:
         return ""
     saved = costs.saving_of_year(cycle)
-    paid = payback(saved, costs) if saved is not None else ""
+    idle = recorded_idle_saving(analysis, costs)
+    paid = "" if saved is None else payback(saved_year(saved, idle, costs).money, costs)
     found = [
         _demand(analysis, cycle, costs),
-        text(f"By what the plan saves, {paid}.") if paid else "",
+        text(f"What is saved in shifts and outside of them {paid}.") if paid else "",
     ]
     return (
         f'<section id="around"><h2>Around the clock</h2><p class="hint">{" ".join(found).strip()}'
@@ -588,11 +571,16 @@ def clock_section(analysis: Analysis, costs: Costs) -> str:
 def _demand(analysis: Analysis, cycle: Production, costs: Costs) -> str:
     """The largest quarter of an hour, and its price where one is given."""
     peak = demand_watts(analysis, cycle)
-    price = ""
-    if costs.demand_price > 0.0:
-        price = f", {money(peak / 1000.0 * costs.demand_price, costs.currency)} a year"
+    price = f", {demand_money(peak, costs)}"
     limit = f" ({cycle.supply})" if cycle.supply else ""
     return f"The largest quarter of an hour takes {watts(peak)} on average{limit}{text(price)}."
+
+
+def demand_money(peak: float, costs: Costs) -> str:
+    """What the largest quarter of an hour [W] costs a year, where its price is given."""
+    if costs.demand_price <= 0.0:
+        return "demand price not given"
+    return f"{money(peak / 1000.0 * costs.demand_price, costs.currency)} a year"
 
 
 LEFT_ALONE = "STAND_ON_BRAKES"
@@ -604,7 +592,7 @@ _TODAY = "<small>today: what the controller does if left alone</small>"
 @dataclass(frozen=True)
 class IdleSaving:
     """Money of a year outside of the shifts: the controller left alone, and in its deepest mode;
-    and the power of both [W].
+    and the power of both [W], through so many hours. measured: whether both powers were.
     """
 
     mode: str
@@ -612,6 +600,18 @@ class IdleSaving:
     deepest: float
     watts_left_alone: float
     watts_deepest: float
+    hours: float
+    measured: bool = False
+
+    @property
+    def energy(self) -> float:
+        """What the deepest mode saves [J]."""
+        return (self.watts_left_alone - self.watts_deepest) * self.hours * 3600.0
+
+    @property
+    def basis(self) -> str:
+        """What the powers rest on, in words; it has no interval."""
+        return "from measured powers" if self.measured else "from the data sheet, not measured"
 
     @property
     def saved(self) -> float:
@@ -619,16 +619,44 @@ class IdleSaving:
         return self.left_alone - self.deepest
 
 
-def idle_saving(watts_at_rest: Mapping[str, float], costs: Costs) -> IdleSaving | None:
+@dataclass(frozen=True)
+class SavedYear:
+    """What is saved of a year in shifts and outside of them: money, and energy [J]."""
+
+    money: Amount
+    energy: Amount
+
+    def with_energy(self, costs: Costs) -> str:
+        """Energy and CO2 in words; "" where they go the other way than the money."""
+        word, energy = self.energy.gain()
+        if word != self.money.gain()[0]:
+            return ""
+        return f"{kilowatt_hours(energy.value)}, {kilograms(costs.co2(energy.value))} CO2"
+
+
+def saved_year(saved: Amount, idle: IdleSaving | None, costs: Costs) -> SavedYear:
+    """The saving in shifts [J] with that outside of them, which has no interval."""
+    price, energy = (0.0, 0.0) if idle is None else (idle.saved, idle.energy)
+    return SavedYear(saved.of(costs.money).plus(price), saved.plus(energy))
+
+
+def idle_saving(
+    watts_at_rest: Mapping[str, float], costs: Costs, *, measured: bool = False
+) -> IdleSaving | None:
     """What hibernation saves outside of the shifts; None where a power of rest [W] is not known, or
-    it saves nothing.
+    it saves nothing. measured: whether the powers were.
     """
     if not {LEFT_ALONE, _DEEPEST} <= set(watts_at_rest) or costs.idle_hours <= 0.0:
         return None
     watts = [watts_at_rest[mode] for mode in (LEFT_ALONE, _DEEPEST)]
     left, deepest = (each * costs.idle_hours / 1000.0 * costs.idle_price for each in watts)
-    found = IdleSaving(_DEEPEST.lower(), left, deepest, *watts)
+    found = IdleSaving(_DEEPEST.lower(), left, deepest, *watts, costs.idle_hours, measured)
     return found if found.saved >= _NOTHING else None
+
+
+def recorded_idle_saving(analysis: Analysis, costs: Costs) -> IdleSaving | None:
+    """The same of the robot of a recording, by its data."""
+    return idle_saving(idle_watts(analysis), costs, measured=rest_measured(analysis))
 
 
 def idle_sentence(found: IdleSaving | None, costs: Costs) -> str:
@@ -637,7 +665,7 @@ def idle_sentence(found: IdleSaving | None, costs: Costs) -> str:
         return ""
     return (
         f"Outside of shifts: {found.mode} instead of closing the brakes saves "
-        f"{yearly_money(found.saved, costs.currency)} a year."
+        f"{yearly_money(found.saved, costs.currency)} a year, {found.basis}."
     )
 
 
@@ -651,6 +679,7 @@ def _idle(analysis: Analysis, costs: Costs) -> str:
         )
     if not found or costs.idle_hours <= 0.0:
         return ""
+    saving = recorded_idle_saving(analysis, costs)
     seconds_idle = costs.idle_hours * 3600.0
     rows = [
         (
@@ -666,6 +695,6 @@ def _idle(analysis: Analysis, costs: Costs) -> str:
         f'<p class="hint">{significant(costs.idle_hours, 6)} hours a year lie outside of the '
         "shifts (nights, weekends, holidays): at machine home, by the data of controller and "
         "tool. Left alone, the controller only closes the brakes. "
-        f"{text(idle_sentence(idle_saving(found, costs), costs))}</p>"
+        f"{text(idle_sentence(saving, costs))}</p>"
         f"{table(heads, rows, 'When nobody works', COMPACT)}"
     )

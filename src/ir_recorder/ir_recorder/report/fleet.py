@@ -22,6 +22,7 @@ from ir_recorder.analysis.production import (
     levers,
     mean_of,
     production_of,
+    rest_measured,
     sum_of,
     without_production,
 )
@@ -172,7 +173,8 @@ class Member:
     """A recording of a robot. robot: the folder that the file lies in, or its own name; cycle: what
     its program takes in production; measures: joules of a cycle that each could save at most;
     demand [W]: of its largest quarter of an hour; idle [W]: at rest by power mode; month: of its
-    start, as "2026-05" (UTC); driven, predicted [J]: of its run, as it was driven.
+    start, as "2026-05" (UTC); driven, predicted [J]: of its run, as it was driven; rest_measured:
+    whether powers at rest were.
     """
 
     robot: str
@@ -185,6 +187,7 @@ class Member:
     month: str
     driven: float
     predicted: float
+    rest_measured: bool = False
 
 
 def read_members(
@@ -241,6 +244,7 @@ def member_of(analysis: Analysis, robot: str, said: Said = lambda _: None) -> Me
         idle_watts(analysis),
         started(analysis.recording).strftime("%Y-%m"),
         *driven_and_predicted(analysis),
+        rest_measured(analysis),
     )
 
 
@@ -426,10 +430,11 @@ def _tiles(robots: Sequence[Robot], costs: Costs) -> str:
         return f'<p class="hint">{_apart(robots)}</p>'
     yearly = sum_of([robot.yearly for robot in summed])
     price = yearly_money(costs.money(yearly.value), costs.currency)
+    of = f"{counted(len(summed), 'robot')}, in shifts, as recorded"
     return row_of(
         [
-            Tile("energy a year", kilowatt_hours(yearly.value), (counted(len(summed), "robot"),)),
-            Tile("costs a year", price, (f"{kilograms(costs.co2(yearly.value))} of CO2",)),
+            Tile("energy a year", kilowatt_hours(yearly.value), (of,)),
+            Tile("costs a year", price, (f"{kilograms(costs.co2(yearly.value))} of CO2", of)),
         ]
     )
 
@@ -438,12 +443,18 @@ def _paid(members: Sequence[Member], costs: Costs) -> str:
     """What those who pay ask first, of all robots together."""
     saved, common = _saved_and_common(members, costs)
     idle = _idle_saving(members, costs)
+    robots = robots_of(members, costs)
     if saved is None:
-        return Paid(None, 0.0, idle, None).html(costs)
-    robots = len({member.robot for member in members if member.cycle.savings is not None})
-    of = f", {counted(robots, 'robot')}"
-    line = fleet_of_line(members, costs)
-    return Paid(saved, common, idle, line, of, "common programs", robots=robots).html(costs)
+        return Paid(None, 0.0, idle, robots=len(robots)).html(costs)
+    without = [robot.yearly.value for robot in robots if robot.saved is None]
+    of = f", {counted(len(robots), 'robot')}"
+    if without:
+        of += f", {len(without)} of them without a plan's saving, as recorded"
+    recorded = ("as recorded", sum_of([robot.yearly for robot in robots]).value)
+    before = "common programs"
+    before_them = common + sum(without)
+    paid = Paid(saved, before_them, idle, of, before, recorded, robots=len(robots))
+    return paid.html(costs)
 
 
 def _robots(robots: Sequence[Robot], costs: Costs) -> str:
@@ -538,7 +549,8 @@ def _idle_saving(members: Sequence[Member], costs: Costs) -> IdleSaving | None:
         own.update({mode: max(power, own.get(mode, 0.0)) for mode, power in member.idle.items()})
     modes = set.intersection(*(set(rest) for rest in rests.values())) if rests else set()
     watts_of_all = {mode: sum(rest[mode] for rest in rests.values()) for mode in modes}
-    return idle_saving(watts_of_all, costs)
+    measured = all(member.rest_measured for member in members if member.idle)
+    return idle_saving(watts_of_all, costs, measured=measured)
 
 
 def _rest_head(mode: str) -> str:
@@ -660,16 +672,32 @@ def _potential(members: Sequence[Member], robots: Sequence[Robot], costs: Costs)
     found = by_measure(members, costs)
     if not found:
         return '<p class="empty">No recording says it.</p>'
-    rows = [
-        (
-            *_row(name, own, robots),
-            text(yearly_money(costs.money(sum(own.values())), costs.currency)),
-        )
-        for name, own in found.items()
+    priced = [
+        (costs.money(sum(own.values())), _row(name, own, robots)) for name, own in found.items()
     ]
+    priced += _night_row(members, robots, costs)
+    priced.sort(key=lambda row: -row[0])
+    rows = [(*cells, text(yearly_money(price, costs.currency))) for price, cells in priced]
     heads = ("measure", *_robot_heads(robots), ">all", ">a year, at most")
     hint = "Upper bounds, each by itself: together they count some joules twice."
     return f'<p class="hint">{hint}</p>{table(heads, rows, "kWh a year by measure")}'
+
+
+def _night_row(
+    members: Sequence[Member], robots: Sequence[Robot], costs: Costs
+) -> list[tuple[float, tuple[str, ...]]]:
+    """Rest outside of the shifts as a measure, with its money; none where it saves nothing."""
+    together = _idle_saving(members, costs)
+    if together is None:
+        return []
+    own = {robot.name: _idle_saving(_own(members, robot), costs) for robot in robots}
+    energies = {name: idle.energy for name, idle in own.items() if idle is not None}
+    name = f"at night and at weekends: {together.mode} instead of closed brakes, {together.basis}"
+    return [(together.saved, _row(name, energies, robots))]
+
+
+def _own(members: Sequence[Member], robot: Robot) -> list[Member]:
+    return [member for member in members if member.robot == robot.name]
 
 
 def _section(title: str, content: str) -> str:

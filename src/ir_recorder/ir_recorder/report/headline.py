@@ -13,7 +13,6 @@ from ir_recorder.analysis.production import (
     Production,
     driven_and_predicted,
     drives_only,
-    idle_watts,
     planned_clearance,
     planned_interval,
     planned_share,
@@ -26,7 +25,7 @@ from ir_recorder.report.costs import (
     NAMES,
     Costs,
     cycles_of_year,
-    idle_saving,
+    recorded_idle_saving,
     share_between,
     yearly_money,
 )
@@ -48,7 +47,6 @@ from ir_recorder.report.number_text import (
     watts,
 )
 from ir_recorder.report.paid import Paid, Tile
-from ir_recorder.report.whole_line import of_recording
 
 _STYLES = {Verdict.HOLDS: "good", Verdict.FAILS: "bad", Verdict.NOT_CHECKED: "open"}
 
@@ -193,10 +191,12 @@ def paid_row(analysis: Analysis, costs: Costs) -> str:
 
 def _paid(analysis: Analysis, costs: Costs) -> Paid:
     cycle = production_of(analysis)
-    idle = idle_saving(idle_watts(analysis), costs) if cycle is not None else None
+    idle = None
+    if cycle is not None:
+        idle = recorded_idle_saving(analysis, costs)
     saved = costs.saving_of_year(cycle) if cycle is not None else None
     if cycle is None or cycle.savings is None or saved is None:
-        return Paid(None, 0.0, idle, None)
+        return Paid(None, 0.0, idle)
     total = cycle.savings.total
     pace = total.seconds or cycle.seconds
     common = total.common * costs.cycles_per_year(pace)
@@ -205,8 +205,7 @@ def _paid(analysis: Analysis, costs: Costs) -> Paid:
     if analysis.program is not None:
         name = f"as driven, {analysis.recording.origin}"
         driven = (name, costs.energy_of_year(cycle).value)
-    line = of_recording(analysis, costs)
-    return Paid(saved, common, idle, line, said, "common program", driven, cycle.supply)
+    return Paid(saved, common, idle, said, "common program", driven, cycle.supply)
 
 
 def run_tiles(analysis: Analysis) -> str:

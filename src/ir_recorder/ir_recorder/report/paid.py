@@ -1,6 +1,5 @@
 """The top of every page for those who pay: a year before and after as bars, what the plan saves of
-it, what rest outside of the shifts saves, both together, and what that is of the line and of the
-factory.
+it, what rest outside of the shifts saves, and both together.
 """
 
 from __future__ import annotations
@@ -14,12 +13,14 @@ from ir_recorder.report.bars import Piece, Row, bars
 from ir_recorder.report.costs import (
     Costs,
     IdleSaving,
+    SavedYear,
     payback,
+    saved_year,
     yearly_money,
     yearly_span,
 )
 from ir_recorder.report.number_text import kilowatt_hours, text
-from ir_recorder.report.whole_line import WholeLine, with_ends
+from ir_recorder.report.whole_line import with_ends
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Tile:
 @dataclass(frozen=True)
 class Paid:
     """What those who pay ask first. saved [J] a year by the plan, of `common` [J]; None where it is
-    not known; idle: outside of the shifts; line: of more than robots. counted: what the year is
+    not known; idle: outside of the shifts. counted: what the year is
     made of, in words; before: what it is held against. driven: what else a year of it is called,
     and what that takes [J]. supply: what limits the figures. robots: how many save it together.
     """
@@ -47,7 +48,6 @@ class Paid:
     saved: Amount | None
     common: float
     idle: IdleSaving | None
-    line: WholeLine | None
     counted: str = ""
     before: str = "today"
     driven: tuple[str, float] | None = None
@@ -56,7 +56,7 @@ class Paid:
 
     def tiles(self, costs: Costs) -> list[Tile]:
         """The figures that are known."""
-        shown = [self._saved(costs), self._idle(costs), self._both(costs), self._line()]
+        shown = [self._saved(costs), self._idle(costs), self._both(costs)]
         return [tile for tile in shown if tile is not None]
 
     def html(self, costs: Costs) -> str:
@@ -73,7 +73,8 @@ class Paid:
         nights = (0.0, 0.0) if self.idle is None else (self.idle.left_alone, self.idle.deepest)
         shifts = costs.money(self.common), costs.money(self.common - self.saved.value)
         before = shifts[0] + nights[0]
-        saved = self._money(costs)
+        year = self._year(costs)
+        saved = year.money
         word, gain = saved.gain()
         ends = (before - saved.high, before - saved.low)
         sure = f"90 % interval {yearly_span(*ends)} {costs.currency}" if ends[0] < ends[1] else ""
@@ -85,7 +86,8 @@ class Paid:
             name, energy = self.driven
             rows.append(_year_row(name, "driven", (costs.money(energy), nights[1]), costs))
         less = "less" if word == "saved" else "more"
-        head = f"{yearly_money(gain.value, costs.currency)} {less} a year"
+        parts = (yearly_money(gain.value, costs.currency), year.with_energy(costs))
+        head = f"{', '.join(part for part in parts if part)} {less} a year"
         if saved.doubt:
             head = f"It is open whether anything is saved: {head}"
         pale = " Pale: at night and at weekends." if self.idle is not None else ""
@@ -96,12 +98,10 @@ class Paid:
             f'<p class="hint">{text(hint)}</p></section>'
         )
 
-    def _money(self, costs: Costs) -> Amount:
+    def _year(self, costs: Costs) -> SavedYear:
         """What is saved of a year in all."""
         assert self.saved is not None
-        money = self.saved.of(costs.money)
-        night = 0.0 if self.idle is None else self.idle.saved
-        return Amount(money.value + night, money.low + night, money.high + night)
+        return saved_year(self.saved, self.idle, costs)
 
     def _saved(self, costs: Costs) -> Tile | None:
         if self.saved is None:
@@ -115,52 +115,38 @@ class Paid:
             f"{share} {less}, {energy}",
             gain.doubt,
             self.supply,
-            self._payback(self.saved, costs),
+            payback(self._year(costs).money, costs) if self.idle is None else "",
         )
         price = yearly_money(costs.money(gain.value), costs.currency)
         return Tile(f"{word} a year in shifts, by the plan", price, notes)
-
-    def _payback(self, saved: Amount, costs: Costs) -> str:
-        """When an hour of an engineer for each robot is paid back."""
-        found = payback(saved.times(1.0 / self.robots), costs)
-        return f"{found}, for each robot in the mean" if found and self.robots > 1 else found
 
     def _idle(self, costs: Costs) -> Tile | None:
         if self.idle is None:
             return None
         found = self.idle
+        of = f", {self.robots} robots together" if self.robots > 1 else ""
         return Tile(
             "saved a year at night and at weekends",
             yearly_money(found.saved, costs.currency),
             (
                 f"{found.mode} ({found.watts_deepest:.0f} W) instead of closed brakes "
-                f"({found.watts_left_alone:.0f} W)",
+                f"({found.watts_left_alone:.0f} W){of}",
+                found.basis,
             ),
         )
 
     def _both(self, costs: Costs) -> Tile | None:
         if self.saved is None or self.idle is None:
             return None
-        word, gain = self._money(costs).gain()
+        year = self._year(costs)
+        word, gain = year.money.gain()
         price = yearly_money(gain.value, costs.currency)
         today = costs.money(self.common) + self.idle.left_alone
         share = f"{_percent(gain.value, today)} {'less' if word == 'saved' else 'more'}"
-        return Tile(f"{word} a year, both together", price, (_between(gain, costs), share))
-
-    def _line(self) -> Tile | None:
-        if self.line is None:
-            return None
-        word, line = self.line.line.gain()
-        factory = self.line.factory.gain()[1]
-        return Tile(
-            f"{'less' if word == 'saved' else 'more'} energy of the whole line",
-            f"{line.value:.1f} %",
-            (
-                _percents(line),
-                f"of the factory with its hall {with_ends(factory)}",
-                "if every robot did the same, in shifts",
-            ),
-        )
+        unsure = _between(gain, costs)
+        sure = "nights counted as sure" if unsure else ""
+        notes = (unsure, sure, share, year.with_energy(costs), payback(year.money, costs))
+        return Tile(f"{word} a year, both together", price, notes)
 
 
 def _year_row(
@@ -189,12 +175,6 @@ def row_of(tiles: Sequence[Tile]) -> str:
 
 def _percent(part: float, whole: float) -> str:
     return f"{100.0 * part / whole:.1f} %" if whole > 0.0 else ""
-
-
-def _percents(share: Amount) -> str:
-    if share.high <= share.low:
-        return ""
-    return f"90 % interval {share.low:.1f} to {share.high:.1f} %"
 
 
 def _between(money: Amount, costs: Costs) -> str:

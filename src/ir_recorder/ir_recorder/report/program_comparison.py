@@ -9,13 +9,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from ir_description import Cell
 from ir_msgs_py.savings import BeforeAfter, Side, StepChange
 from ir_recorder.analysis.production import (
     DRIVES_ONLY,
     OPEN,
     Amount,
+    all_rests_measured,
     home_watts,
+    largest_quarter,
     saved_amount,
 )
 from ir_recorder.report.cell_scene import cell_scene
@@ -27,6 +31,7 @@ from ir_recorder.report.costs import (
     assumed_section,
     counted_with,
     cycles_of_year,
+    demand_money,
     idle_saving,
     share_between,
     yearly_money,
@@ -107,9 +112,8 @@ def paid_row(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     year = year_of(found, side, costs)
     today = side.saving.common * year.cycles_a_year
     idle = _idle(found, cell, costs)
-    line = of_saving(side.saving, costs) if cell.robot.controller.counted else None
     counted = f", {cycles_of_year(year.pace, costs)}"
-    return Paid(year.saved, today, idle, line, counted).html(costs)
+    return Paid(year.saved, today, idle, counted).html(costs)
 
 
 def tiles(found: BeforeAfter, costs: Costs) -> str:
@@ -118,9 +122,8 @@ def tiles(found: BeforeAfter, costs: Costs) -> str:
     report = side.report
     today = found.today.report
     saving = side.saving
-    counted = year_of(found, side, costs)
-    word, year = counted.saved.gain()
-    _, cycle = saved_amount(saving).gain()
+    word, cycle = saved_amount(saving).gain()
+    quarter = demand_of(side)
     return row_of(
         [
             Tile(
@@ -133,19 +136,23 @@ def tiles(found: BeforeAfter, costs: Costs) -> str:
                 ),
             ),
             Tile(
-                f"CO2 {word} a year",
-                kilograms(costs.co2(year.value)),
-                (f"{kilowatt_hours(year.value)} {'less' if word == 'saved' else 'more'}",),
-            ),
-            Tile(
                 "cycle time",
                 seconds(report.duration),
                 (f"today {seconds(today.duration)}", f"of the program \u201c{side.name}\u201d"),
             ),
             Tile(
+                "largest quarter of an hour",
+                watts(quarter),
+                (f"today {watts(demand_of(found.today))}", demand_money(quarter, costs)),
+            ),
+            Tile(
                 "peak power",
                 watts(report.peak_power),
-                (span_of(*side.peak, watts), f"today {watts(today.peak_power)}"),
+                (
+                    span_of(*side.peak, watts),
+                    f"today {watts(today.peak_power)}",
+                    "of a 10 ms reading",
+                ),
             ),
         ]
     )
@@ -167,15 +174,19 @@ def figure_table(found: BeforeAfter, costs: Costs) -> str:
             *(_amount(year.shift if year else None, kilowatt_hours) for year in years),
         ),
         (
-            "energy a year",
+            "energy a year, in shifts",
             *(_amount(year.energy if year else None, kilowatt_hours) for year in years),
         ),
-        ("costs a year", *(_cost(year.energy if year else None, costs) for year in years)),
         (
-            "saved a year",
+            "costs a year, in shifts",
+            *(_cost(year.energy if year else None, costs) for year in years),
+        ),
+        (
+            "saved a year, in shifts",
             *(_cost(year.saved if year and k else None, costs) for k, year in enumerate(years)),
         ),
-        ("CO2 a year", *(_co2(year, costs) for year in years)),
+        ("CO2 a year, in shifts", *(_co2(year, costs) for year in years)),
+        ("largest quarter of an hour", *(_demand(side, costs) for side in sides)),
         (
             "peak power",
             *(
@@ -189,41 +200,62 @@ def figure_table(found: BeforeAfter, costs: Costs) -> str:
     return table(("", *(f">{side.name}" for side in sides)), rows, "Figures")
 
 
+def demand_of(side: Side) -> float:
+    """The largest mean power [W] of a quarter of an hour of cycles of a side, one directly after
+    the other, each movement and pause at its mean power.
+    """
+    hops = side.hops
+    seconds_of = np.array([hop.seconds for hop in hops])
+    return largest_quarter(seconds_of, np.array([hop.energy for hop in hops]))
+
+
+def _demand(side: Side, costs: Costs) -> str:
+    if not side.found:
+        return DASH
+    power = demand_of(side)
+    return _cell(watts(power), demand_money(power, costs))
+
+
 def _idle(found: BeforeAfter, cell: Cell, costs: Costs) -> IdleSaving | None:
     """What rest saves outside of the shifts, where the controller's power is known."""
     controller = cell.robot.controller
     if not controller.counted:
         return None
-    return idle_saving(home_watts(cell, found.planned.movements[-1].load, controller), costs)
+    rests = home_watts(cell, found.planned.movements[-1].load, controller)
+    return idle_saving(rests, costs, measured=all_rests_measured(controller))
 
 
 def change_table(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
-    """The changes that save most, the least work first, and the rest outside of the shifts."""
+    """Rest outside of the shifts, then the changes that save most, the least work first."""
     cycles = year_of(found, found.planned, costs).cycles_a_year
     priced = [
-        (costs.money(change.saving.saved * cycles), _change(k, change))
-        for k, change in enumerate(found.changes, start=1)
+        (costs.money(change.saving.saved * cycles), _change(change)) for change in found.changes
     ]
     idle = _idle(found, cell, costs)
     if idle is not None:
         words = f"{idle.mode} instead of brakes that are only closed"
-        where = f"at night and at weekends<small>{WORK[MODE]}</small>"
+        where = f"at night and at weekends<small>{WORK[MODE]}, {idle.basis}</small>"
         priced.insert(0, (idle.saved, (where, text(words), DASH)))
     most = max((price for price, _ in priced), default=0.0)
     rows = [
-        (*cells, text(yearly_money(price, costs.currency)), bar(price, most, "planned"))
-        for price, cells in priced
+        (
+            f"{k}. {where}",
+            *cells,
+            text(yearly_money(price, costs.currency)),
+            bar(price, most, "planned"),
+        )
+        for k, (price, (where, *cells)) in enumerate(priced, start=1)
     ]
     none = "" if found.changes else '<p class="empty">No change saves as much as a joule.</p>'
     heads = ("where", "what to do", ">saved a cycle", ">saved a year", "")
     return none + (table(heads, rows, "Changes") if rows else "")
 
 
-def _change(k: int, change: StepChange) -> tuple[str, ...]:
+def _change(change: StepChange) -> tuple[str, ...]:
     saving = change.saving
     between = span_of(saving.saved_low, saving.saved_high, watt_hours)
     return (
-        f"{k}. {text(change.name)}<small>{text(WORK[change.work])}{_long(change)}</small>",
+        f"{text(change.name)}<small>{text(WORK[change.work])}{_long(change)}</small>",
         text(change.words),
         _cell(watt_hours(saving.saved), between, "" if saving.certain else OPEN),
     )
@@ -546,7 +578,7 @@ def _changes(found: BeforeAfter, costs: Costs) -> Sequence[Mapping[str, TableVal
         {
             **{
                 "program": found.towards,
-                "what": f"change {k}: {change.name}",
+                "what": f"change: {change.name}",
                 "mode": change.words,
             },
             **{"seconds_s": change.seconds[1]},
@@ -554,7 +586,7 @@ def _changes(found: BeforeAfter, costs: Costs) -> Sequence[Mapping[str, TableVal
             **{"saved_low_j": change.saving.saved_low, "saved_high_j": change.saving.saved_high},
             **{"year_saved_money": costs.money(change.saving.saved * cycles)},
         }
-        for k, change in enumerate(found.changes, start=1)
+        for change in found.changes
     ]
 
 
