@@ -19,6 +19,7 @@ from ir_recorder.analysis.production import (
     Amount,
     demand_watts,
     idle_watts,
+    levers,
     production_of,
 )
 from ir_recorder.errors import RecorderError
@@ -199,6 +200,28 @@ def test_the_documentation_has_the_table_of_the_settings() -> None:
     page = (Path(__file__).resolve().parents[2] / "docs" / "report.md").read_text(encoding="utf-8")
     rows = [row for row in settings_table(Costs()).splitlines() if not row.startswith("| `given`")]
     assert "\n".join(rows) in page
+
+
+def test_of_pauses_in_a_mode_only_what_is_above_the_deepest_one_can_be_saved(
+    analysis: Analysis,
+) -> None:
+    """Once all of it: no robot takes less than in its deepest mode."""
+    pauses = [
+        r
+        for r in analysis.steps
+        if r.step.movement.is_pause and r.step.movement.power_mode not in ("", "STAND_ON_MOTORS")
+    ]
+    assert pauses
+    least = min(idle_watts(analysis).values())
+    assert least > 0.0
+    above = sum(max(r.energy - least * r.seconds, 0.0) for r in pauses)
+    found = [
+        each.joules for each in levers(analysis, most=20) if each.name == "pauses in a power mode"
+    ]
+    cycle = production_of(analysis)
+    assert cycle is not None
+    assert sum(found) == pytest.approx(above / cycle.cycles, abs=1.0)
+    assert sum(found) < sum(r.energy for r in pauses)
 
 
 def test_without_a_program_there_is_nothing_to_pay(analysis: Analysis) -> None:

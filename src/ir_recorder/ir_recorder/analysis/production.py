@@ -459,6 +459,8 @@ def _planned(analysis: Analysis, planned: Sequence[PlannedMovement]) -> Producti
     steps = _summed((step_label(step), step.duration, step.report.energy) for step in planned)
     low, high = planned_interval(analysis.recording) or (whole.energy, whole.energy)
     name = "planned program, predicted"
+    if analysis.savings is not None:
+        name = "planned program in its own time, predicted"
     return Production(
         name,
         PREDICTED,
@@ -531,16 +533,21 @@ def _drive_levers(flows: EnergyFlows) -> list[Lever]:
 
 
 def _time_levers(analysis: Analysis) -> list[Lever]:
+    least = min(idle_watts(analysis).values(), default=0.0)
     moving = sum(result.base_energy for result in analysis.movements)
     pauses = [result for result in analysis.steps if result.step.movement.is_pause]
     standing = sum(r.energy for r in pauses if r.step.movement.power_mode in _STANDING)
-    resting = sum(r.energy for r in pauses if r.step.movement.power_mode not in _STANDING)
+    resting = sum(
+        max(r.energy - least * r.seconds, 0.0)
+        for r in pauses
+        if r.step.movement.power_mode not in _STANDING
+    )
     program = analysis.program
     waiting = program.waiting.energy if program is not None else math.nan
     for pause in _added(program):
         own = analysis.steps[pause.step].step.movement.power_mode
         standing += pause.energy if own in _STANDING else 0.0
-        resting += 0.0 if own in _STANDING else pause.energy
+        resting += 0.0 if own in _STANDING else max(pause.energy - least * pause.seconds, 0.0)
     return [
         Lever(
             "controller, drives and tool while the robot moves",
@@ -558,7 +565,7 @@ def _time_levers(analysis: Analysis) -> list[Lever]:
             "pauses in a power mode",
             resting,
             "deeper modes, earlier, woken later; a tool that can be switched off",
-            "all of it",
+            "what they take above the deepest mode at machine home",
         ),
         Lever(
             "waiting between steps", waiting, "machines and nodes that answer sooner", "all of it"

@@ -648,9 +648,9 @@ def idle_saving(
     """
     if not {LEFT_ALONE, _DEEPEST} <= set(watts_at_rest) or costs.idle_hours <= 0.0:
         return None
-    watts = [watts_at_rest[mode] for mode in (LEFT_ALONE, _DEEPEST)]
-    left, deepest = (each * costs.idle_hours / 1000.0 * costs.idle_price for each in watts)
-    found = IdleSaving(_DEEPEST.lower(), left, deepest, *watts, costs.idle_hours, measured)
+    alone, rest = watts_at_rest[LEFT_ALONE], watts_at_rest[_DEEPEST]
+    left, deepest = (each * costs.idle_hours / 1000.0 * costs.idle_price for each in (alone, rest))
+    found = IdleSaving(_DEEPEST.lower(), left, deepest, alone, rest, costs.idle_hours, measured)
     return found if found.saved >= _NOTHING else None
 
 

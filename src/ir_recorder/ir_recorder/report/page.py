@@ -114,10 +114,11 @@ def report_html(
     known = not math.isnan(analysis.safety_distance)
     drawn = analysis.safety_distance if known else (tolerances or Tolerances()).safety_distance
     name = analysis.cell.name if analysis.cell is not None else analysis.recording.path.stem
+    shown = "what the plan saves" if analysis.recording.never_driven else "the recorded run"
     controller = load_power_data() if analysis.cell is None else analysis.cell.robot.controller
     parts = {
-        "title": text(f"{name} – report of a recording"),
-        "name": text(name),
+        "title": text(f"{name}: {shown}"),
+        "name": text(f"{name}: {shown}"),
         "subtitle": subtitle(analysis),
         "source": source(analysis),
         "verdict": verdict(checks, analysis),

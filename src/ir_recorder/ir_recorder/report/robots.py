@@ -76,10 +76,13 @@ def _tiles(analyses: Mapping[str, Analysis], costs: Costs) -> str:
     )
     waits = [f"{name} {seconds(sum(waited(a).values()))}" for name, a in analyses.items()]
     cycle = common_cycle(analyses)
+    each = ""
+    if cycle is not None and cycle.cycles > 1.0:
+        each = f"{cycle.cycles:.3g} cycles, {watt_hours(cycle.energy)} each"
     yearly = [] if cycle is None else [yearly_tile(cycle, costs), _demand(analyses, costs)]
     shown = (
         *yearly,
-        Tile("energy of all", energy, (predicted,)),
+        Tile("energy of all", energy, (each, predicted)),
         Tile("common peak", watts(common_peak(analyses)), ("of a 10 ms reading",)),
         Tile("waited for signals", waits[0], tuple(waits[1:])),
     )

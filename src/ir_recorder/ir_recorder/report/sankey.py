@@ -48,6 +48,8 @@ def sankey_section(analysis: Analysis) -> str:
     if flows is None or not flows.known or flows.mains <= 0.0:
         return ""
     over = "of the program" if analysis.steps else "of the recording"
+    if analysis.program is not None and analysis.program.unshortened is not None:
+        over += " as driven, its pauses shortened"
     hint = (
         f"Energy {over}, {watt_hours(flows.mains)} at the mains. Gross flows: axes that brake "
         "return energy to the DC bus, masses that are lowered return it to the axes; both flow "
