@@ -24,6 +24,9 @@ from ir_recorder.live.cell_view import CellView, ReceivedCell
 from ir_recorder.live.server import ButtonAnswer
 from ir_recorder.report import report_html
 from ir_recorder.report.compare import comparison_html
+from ir_studies.statistics.findings import findings_of
+from ir_studies.statistics.outputs import page_html as statistics_html
+from ir_studies.statistics.settings import StatisticsSettings
 
 T = TypeVar("T")
 CONTROLS = Path(__file__).with_name("page_controls.js").read_text().strip().split("\n\n")
@@ -224,6 +227,16 @@ def test_a_page_of_an_empty_recording_has_no_error(
     path.write_text(report_html(analyse(bare), ()))
     page = browser.open(path, *TABLET)
     assert page.run("document.getElementById('no-motion').hidden") is False
+    clean(page)
+    page.close()
+
+
+def test_a_study_is_light_or_dark_as_its_button_says(browser: Any, tmp_path: Path) -> None:
+    path = tmp_path / "index.html"
+    path.write_text(statistics_html(findings_of([]), StatisticsSettings("open")))
+    page = browser.open(path, *DESK)
+    page.run("document.getElementById('theme').click()")
+    page.wait("document.documentElement.dataset.theme === 'dark'")
     clean(page)
     page.close()
 

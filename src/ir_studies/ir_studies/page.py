@@ -13,29 +13,30 @@ from ir_recorder.report.number_text import text
 from ir_recorder.report.page import asset
 from ir_recorder.report.tables import table
 
-BUTTON = (
+_BUTTON = (
     '<button id="theme" type="button" title="light or dark" aria-label="light or '
     'dark">\u25d0</button>'
 )
-"""For pages whose scripts answer it."""
 
 
-def page(kind: str, parts: Mapping[str, str], button: str = "") -> str:
+def page(kind: str, parts: Mapping[str, str]) -> str:
     """The page of a kind of study as text. parts: HTML by the names in its page.html, title and
-    subtitle.
+    subtitle; where they have a script, it answers the button for light and dark.
     """
     own = files("ir_studies") / kind
     shell = (files("ir_studies") / "page.html").read_text("utf-8")
-    export = f"<script>{asset('export.js')}\nexportButtons();</script>\n"
+    scripts = f"{asset('charts.js')}\n{asset('export.js')}"
+    plain = f"<script>{scripts}\nthemes(() => {{}}, () => {{}});\nexportButtons();</script>\n"
     inner = {
-        "export": "" if button else export,
+        "button": _BUTTON,
+        "export": "" if "script" in parts else plain,
         "style": asset("page.css"),
         "own_style": (own / "page.css").read_text("utf-8"),
         "badge": "",
         "lead": "",
         "main": _filled((own / "page.html").read_text("utf-8"), parts),
     }
-    return _filled(shell, {"button": button, **inner, **parts})
+    return _filled(shell, {**inner, **parts})
 
 
 def badge(words: str, *, good: bool) -> str:

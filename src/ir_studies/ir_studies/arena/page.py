@@ -40,7 +40,7 @@ from ir_studies.arena.figures import (
     success_over_time,
 )
 from ir_studies.arena.settings import PORTFOLIO, ArenaSettings, settings_text
-from ir_studies.page import BUTTON, badge, lead, page
+from ir_studies.page import badge, lead, page
 from ir_values.arrays import FloatArray
 from ir_values.files import ANYWHERE
 
@@ -164,7 +164,7 @@ def page_html(runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int = 
         ).replace("<", "\\u003c"),
         "script": "\n".join(asset(script) for script in SCRIPTS),
     }
-    return page("arena", parts, BUTTON)
+    return page("arena", parts)
 
 
 def _subtitle(runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int) -> str:

@@ -185,7 +185,7 @@ class LiveClearanceChart extends ClearanceChart {
     const state = history.records[history.index(timeline.now)];
     if (last.energy !== undefined && energyBefore === null) energyBefore = last.energy;
     if (last.energy < energyBefore) energyBefore = last.energy; /* another driver */
-    find("name").textContent = last.cell || "A cell";
+    find("name").textContent = last.cell ? `${last.cell}: the running nodes` : "A cell";
     document.title = last.cell ? `${last.cell} – live` : "Live view";
     find("plant").textContent = last.plant ? `Simulated, not measured: plant ${last.plant}` : "plant not heard";
     find("problem").hidden = !last.problem;

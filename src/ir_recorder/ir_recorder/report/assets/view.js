@@ -292,11 +292,12 @@ async function events(url, headers, take) {
   /* what the server says */
   const VERDICTS = { planned: "good", failed: "bad", planning: "open", cancelled: "open", none: "open", recorded: "good" };
   const show = () => {
-    find("name").textContent = state.name || "A cell";
     document.title = state.name ? `${state.name} – ir view` : "ir view";
     find("subtitle").textContent = state.source || "";
     find("plant").textContent = state.origin || "Predicted, not driven";
     const plan = state.plan || { state: "none", lines: [] };
+    const shows = plan.state !== "recorded" ? "cell and plan" : (state.origin || "").startsWith("Predicted") ? "the plan that was written" : "the recorded run";
+    find("name").textContent = state.name ? `${state.name}: ${shows}` : "A cell";
     const gone = lost || (performance.now() - heardAt > 4000 ? "connection lost" : "");
     find("link").textContent = gone || { planned: "planned", failed: "not planned", planning: "planning", cancelled: "planning was cancelled", none: "nothing planned", recorded: "recorded" }[plan.state];
     find("link").className = `verdict ${gone ? "bad" : VERDICTS[plan.state]}`;
