@@ -264,6 +264,10 @@ def test_of_a_route_a_cycle_is_that_of_a_part(
     assert cycle is not None
     assert cycle.energy == pytest.approx(sum(part.joules for part in made.tending.parts) / 2.0)
     assert sum(share.energy for share in cycle.modes.values()) == pytest.approx(cycle.energy)
+    assert "more outside of their times" not in report_html(made, findings(made))
+    more = replace(made.program.whole, energy=made.program.whole.energy + 36_000.0)
+    longer = replace(made, program=replace(made.program, whole=more))
+    assert "the run 10 Wh more outside of their times" in report_html(longer, findings(longer))
     costs = costs_of(2)
     found = READ.figures_of(report_html(made, findings(made), costs=costs))
     rows = {f"{part.number}": part for part in made.tending.parts}

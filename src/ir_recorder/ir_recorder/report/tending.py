@@ -13,6 +13,8 @@ from ir_recorder.report.gantt import Bar, Gantt, legend, mode_bars
 from ir_recorder.report.number_text import DASH, seconds, text, watt_hours
 from ir_recorder.report.tables import table
 
+_COUNTED = 1.0  # J
+
 
 def tending_section(analysis: Analysis) -> str:
     """The section of a cell with a route of which parts were driven; "" for another."""
@@ -22,8 +24,22 @@ def tending_section(analysis: Analysis) -> str:
     charts = "".join(_figure(part, tending, analysis.recording.power) for part in tending.parts)
     return (
         '<section id="tending"><h2>Parts: what each took, and who waited for whom</h2>'
-        f"{_parts(tending)}{legend(_KINDS)}{charts}</section>"
+        f"{_rest(analysis, tending)}{_parts(tending)}{legend(_KINDS)}{charts}</section>"
     )
+
+
+def _rest(analysis: Analysis, tending: Tending) -> str:
+    """What the run took outside of the times of its parts; "" where that is nothing."""
+    program = analysis.program
+    parts = sum(part.joules for part in tending.parts)
+    rest = program.whole.energy - parts if program is not None else 0.0
+    if not rest >= _COUNTED:
+        return ""
+    said = (
+        f"The parts took {watt_hours(parts)} together, the run {watt_hours(rest)} more outside of "
+        "their times."
+    )
+    return f'<p class="hint">{text(said)}</p>'
 
 
 def _parts(tending: Tending) -> str:
