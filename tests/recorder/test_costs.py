@@ -294,6 +294,27 @@ def test_a_robot_without_figures_of_its_controller_is_in_no_sum_at_the_mains(
     assert fleet.partition("</section>")[0].split("<main>")[1] in alone
 
 
+def test_a_fleet_counts_the_same_robots_in_shifts_and_at_night(analysis: Analysis) -> None:
+    """Once two robots' shifts stood beside three robots' nights."""
+    costs = Costs(price=0.2)
+    member = member_of(analysis, "first")
+    idle = idle_saving(idle_watts(analysis), costs)
+    assert member is not None
+    assert idle is not None
+    assert member.cycle.savings is not None
+    bare = replace(member, robot="second", cycle=replace(member.cycle, savings=None))
+    page = fleet_html([member, bare], costs=costs)
+    total = member.cycle.savings.total
+    shifts = costs.money(total.common * costs.cycles_per_year(total.seconds))
+    shifts += costs.money(costs.energy_of_year(bare.cycle).value)
+    picture = page.split('<section id="year">')[1].partition("</section>")[0]
+    assert f"<b>{yearly_money(shifts + 2.0 * idle.left_alone, 'EUR')}</b>" in picture
+    assert "1 of them without a plan&#x27;s saving, as recorded" in picture
+    measures = page.split("What could be saved, by measure")[1].partition("</section>")[0]
+    assert "at night and at weekends: hibernation" in measures
+    assert yearly_money(2.0 * idle.saved, "EUR") in measures
+
+
 def test_hibernation_outside_of_the_shifts_is_a_headline(analysis: Analysis) -> None:
     costs = Costs(price=0.2)
     found = idle_saving(idle_watts(analysis), costs)
