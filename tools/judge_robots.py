@@ -51,17 +51,15 @@ class Judge:
         above = [*source.urdf.resolve().parents][:6]
         packages = [str(each) for each in (source.packages, *above) if each is not None]
         with tempfile.NamedTemporaryFile("w", suffix=".urdf") as file:
-            file.write(_with_own_package(urdf_text(source), above))
+            file.write(_solid(_with_own_package(urdf_text(source), above)))
             file.flush()
             self.model = pinocchio.buildModelFromUrdf(file.name)
-            self.shapes, seen = (
+            self.shapes, only_seen = (
                 pinocchio.buildGeomFromUrdf(self.model, file.name, kind, package_dirs=packages)
                 for kind in (pinocchio.GeometryType.COLLISION, pinocchio.GeometryType.VISUAL)
             )
-        solid = {shape.parentFrame for shape in self.shapes.geometryObjects}
-        for shape in seen.geometryObjects:  # of links without a collision shape
-            if shape.parentFrame not in solid:
-                self.shapes.addGeometryObject(shape)
+        for shape in only_seen.geometryObjects:
+            self.shapes.addGeometryObject(shape)
         self.data = self.model.createData()
         self.placed = self.shapes.createData()
         names = [joint.name for joint in made.arm.joints]
@@ -146,6 +144,18 @@ class Judge:
         along = (points - placed.translation) @ axis
         beside = np.linalg.norm(np.cross(points - placed.translation, axis), axis=1)
         return np.stack([along, beside], axis=1)
+
+
+def _solid(text: str) -> str:
+    """A URDF whose links have visual shapes only where they have no collision shape: files of the
+    others need not be there.
+    """
+    root = ElementTree.fromstring(text)
+    for link in root.iter("link"):
+        if link.find("collision") is not None:
+            for shape in link.findall("visual"):
+                link.remove(shape)
+    return ElementTree.tostring(root, "unicode")
 
 
 def _with_own_package(text: str, above: Sequence[Path]) -> str:
