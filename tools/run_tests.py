@@ -23,7 +23,7 @@ from xml.etree import ElementTree
 ROOT = Path(__file__).resolve().parent.parent
 OUTPUT = ROOT / "out" / "tests"
 SYSTEM = "tests/system"
-MINUTES = 13  # on two quiet cores
+MINUTES = 12  # on two quiet cores
 WITH_VALUE = ("-k", "-m", "-n", "-p", "-W", "-o", "-c", "--dist", "--deselect", "--ignore")
 NOTHING_COLLECTED = 5  # pytest's exit code: the words may choose tests of one part only
 
