@@ -80,7 +80,10 @@ def outcome(source: RobotSource, folder: Path, judge: bool) -> tuple[str, str]:
     report = plan.report
     reduced = planner.cell.robot.reduced_distances
     overlapping = sum(each.distance < 0.0 for each in reduced)
-    good, judged = where_it_is(Judge(source, made), made) if judge else (True, "not judged")
+    good = True
+    judged = "not judged"
+    if judge:
+        good, judged = where_it_is(Judge(source, made), made)
     return "certified" if report.certified and good else "wrong", (
         f"{'certified' if report.certified else 'NOT CERTIFIED'} {report.duration:.2f} s, "
         f"{report.energy:.0f} J ({report.energy_low:.0f} to {report.energy_high:.0f}), "

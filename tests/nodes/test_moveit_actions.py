@@ -182,6 +182,24 @@ def test_a_goal_whose_client_cancels_it_ends_canceled_as_soon_as_it_may(
     goals.cancel(goal)  # a cancel that comes late finds nothing
 
 
+def test_a_cancel_that_rclpy_does_not_carry_out_ends_the_goal_all_the_same(
+    execution: TrajectoryExecution, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(moveit_actions, "_PATIENCE", 0.05)
+    goals = AcceptedGoals(execution)
+    ended: list[str] = []
+    goal = Of(
+        goal_id=Of(uuid=bytes(16)),
+        is_cancel_requested=False,
+        canceled=lambda: ended.append("canceled"),
+        abort=lambda: ended.append("aborted"),
+    )
+    goals.add(goal)
+    goals.cancel(goal)
+    goals.end(goal, StatusCode.PREEMPTED)
+    assert ended == ["aborted"]
+
+
 def test_a_stop_while_it_is_driven_ends_it_with_the_words_of_the_controller() -> None:
     def send(goal: Any, stopped: Any) -> Any:
         executor.hear("number", 1)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib import import_module
 from threading import Lock
-from time import sleep
+from time import monotonic, sleep
 from typing import Any
 from weakref import WeakSet
 
@@ -21,6 +21,7 @@ MOVE = "move_action"
 EXECUTE = "execute_trajectory"
 STOP = "stop"
 _MOMENT = 1e-3  # s between two looks
+_PATIENCE = 5.0  # s that rclpy may take from a cancel's callback to the goal's state
 _SUCCESSFUL = 0  # of control_msgs/FollowJointTrajectory
 _REFUSED = (-1, -2, -3)  # there: the goal, its joints, its stamp
 _CONTROL_FAILED = -4  # of moveit_msgs/MoveItErrorCodes
@@ -138,12 +139,22 @@ class AcceptedGoals:
         one = self._goals.pop(bytes(goal.goal_id.uuid))
         if code == StatusCode.SUCCESS:
             goal.succeed()
-        elif one.by_client:
-            while not goal.is_cancel_requested:  # rclpy says so just after the cancel's callback
-                sleep(_MOMENT)
+        elif one.by_client and _canceling(goal):
             goal.canceled()
         else:
             goal.abort()
+
+
+def _canceling(goal: Any) -> bool:
+    """Whether rclpy lets a goal end as canceled: it says so just after the cancel's callback, and
+    never where that failed.
+    """
+    until = monotonic() + _PATIENCE
+    while not goal.is_cancel_requested:
+        if monotonic() >= until:
+            return False
+        sleep(_MOMENT)
+    return True
 
 
 @dataclass(frozen=True)

@@ -648,7 +648,8 @@ def idle_saving(
     """
     if not {LEFT_ALONE, _DEEPEST} <= set(watts_at_rest) or costs.idle_hours <= 0.0:
         return None
-    alone, rest = watts_at_rest[LEFT_ALONE], watts_at_rest[_DEEPEST]
+    alone = watts_at_rest[LEFT_ALONE]
+    rest = watts_at_rest[_DEEPEST]
     left, deepest = (each * costs.idle_hours / 1000.0 * costs.idle_price for each in (alone, rest))
     found = IdleSaving(_DEEPEST.lower(), left, deepest, alone, rest, costs.idle_hours, measured)
     return found if found.saved >= _NOTHING else None
