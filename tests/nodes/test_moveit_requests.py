@@ -415,7 +415,8 @@ def test_without_moveit_msgs_the_node_says_where_to_get_them(
 ) -> None:
     from ir_planner.node import moveit
 
-    monkeypatch.setitem(sys.modules, "moveit_msgs", None)
+    for name in ("moveit_msgs", "moveit_msgs.srv"):
+        monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(IrError, match=r"docs/ros_interfaces\.md says how"):
         moveit.moveit_types()
 
