@@ -13,7 +13,7 @@ from mcap.writer import Writer
 from rcl_interfaces.msg import Log
 from rclpy.serialization import serialize_message
 
-from ir_msgs.msg import PlcInputs, PowerState
+from ir_msgs.msg import PlcInputs, PowerState, Signal
 from ir_recorder.errors import ReadError
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.format.schemas import SchemaLibrary
@@ -55,6 +55,27 @@ def test_levels_in_force_are_preferred_to_those_that_were_sent(tmp_path: Path) -
         series = read_recording(path).plc_inputs
         levels = dict(zip(series.names, series.levels[0].tolist(), strict=True))
         assert (levels["ab"], levels["hib"]) == ((1, 0) if len(topics) == 1 else (0, 1))
+
+
+def test_what_carries_no_stamp_is_in_the_time_of_a_plant_that_lags(tmp_path: Path) -> None:
+    start = 10**18
+    power = "/ir_sim_driver/power_state"
+    inputs = "/ir_sim_driver/plc_inputs_in_force"
+    session = RecordingSession(RecordingWriter(tmp_path / "lagging.mcap"), {}, start)
+    session.open_topic(power, "ir_msgs/msg/PowerState", [QosOffer()])
+    session.open_topic(inputs, "ir_msgs/msg/PlcInputs", [QosOffer(transient_local=True)])
+    session.open_topic("/ir_program_runner/signals", "ir_msgs/msg/Signal", [QosOffer()])
+    for second in range(11):  # the plant takes two seconds of the recorder's clock for each
+        reading = PowerState(mode=0)
+        reading.header.stamp.sec = start // 10**9 + second
+        session.message(power, serialize_message(reading), start + 2 * second * 10**9)
+    session.message(inputs, serialize_message(PlcInputs(ab=True)), start + 13 * 10**9)
+    closed = Signal(name="door_closed", value=True)
+    session.message("/ir_program_runner/signals", serialize_message(closed), start + 30 * 10**9)
+    session.finish()
+    recording = read_recording(tmp_path / "lagging.mcap")
+    assert recording.plc_inputs.time == pytest.approx([6.5])
+    assert recording.signals[0].time == pytest.approx(20.0)  # ten seconds after the last reading
 
 
 def test_json_channels_and_missing_topics_are_reported(tmp_path: Path) -> None:

@@ -144,6 +144,7 @@ class _SeriesReader:
         self._namespace, others = chosen_namespace(raw, namespace)
         self._problems += [others] if others else []
         self._prefix = f"{self._namespace.rstrip('/')}/"
+        self._power_series: PowerSeries | None = None
 
     def recording(self) -> Recording:
         raw = self._raw
@@ -152,6 +153,7 @@ class _SeriesReader:
                 self._problems.append(
                     f"{channel.topic} is {channel.message_encoding}, not cdr: left out"
                 )
+        self._power_series = self._series(names.POWER_STATE, self._power)
         found = Recording(
             path=raw.path,
             start_ns=self._start,
@@ -161,7 +163,7 @@ class _SeriesReader:
                 for c in raw.channels
             ),
             joints=self._series(names.JOINT_STATES, self._joints),
-            power=self._series(names.POWER_STATE, self._power),
+            power=self._power_series,
             controller=self._series(names.CONTROLLER_STATE, self._controller),
             plc_inputs=self._plc_inputs(),
             plc_outputs=self._series(
@@ -283,6 +285,17 @@ class _SeriesReader:
     def _seconds(self, stamps: IntArray) -> FloatArray:
         return np.asarray((stamps - self._start) * 1e-9, dtype=np.float64)
 
+    def _plant_time(self, heard: FloatArray) -> FloatArray:
+        """Times of the plant [s] at which messages were heard: a plant that a busy machine holds up
+        lags behind the recorder's clock, by what the meter's readings do.
+        """
+        power = self._power_series
+        if power is None or not len(power.time):
+            return heard
+        readings = np.maximum.accumulate(power.heard)
+        lag = np.interp(heard, readings, readings - power.time)
+        return np.asarray(heard - lag, dtype=np.float64)
+
     def _joints(self, columns: Columns, channel: RawChannel) -> JointSeries:
         first = next(self._decoded(channel), None)
         if first is None:
@@ -338,9 +351,13 @@ class _SeriesReader:
         self, bits: tuple[str, ...], stamped: bool
     ) -> Callable[[Columns, RawChannel], BitSeries]:
         def build(columns: Columns, channel: RawChannel) -> BitSeries:
-            times = columns.stamps() if stamped else channel.log_time
+            times = (
+                self._seconds(columns.stamps())
+                if stamped
+                else self._plant_time(self._seconds(channel.log_time))
+            )
             levels = np.stack([columns.integers(bit) for bit in bits], axis=1)
-            return BitSeries(self._seconds(times), bits, levels)
+            return BitSeries(times, bits, levels)
 
         return build
 
@@ -444,7 +461,9 @@ class _SeriesReader:
             self._problems.append(f"{self._prefix}{name} isn't in the recording")
 
     def _decoded(self, channel: RawChannel) -> Iterator[tuple[float, Any]]:
-        """Messages one by one with their log time [s]; undecodable ones are counted."""
+        """Messages one by one with the plant's time [s] at which they were heard; undecodable ones
+        are counted.
+        """
         try:
             decode = decoder_of(channel)
         except Exception as error:  # a damaged schema makes the parser raise nearly anything
@@ -453,7 +472,8 @@ class _SeriesReader:
             )
             return
         failed = 0
-        for stamp, data in zip(channel.log_time.tolist(), channel.messages, strict=True):
+        times = self._plant_time(self._seconds(channel.log_time))
+        for time, data in zip(times.tolist(), channel.messages, strict=True):
             try:
                 message = decode(data) if decode else None
             except Exception:  # damaged bytes: the decoder raises nearly anything
@@ -461,7 +481,7 @@ class _SeriesReader:
             if message is None:
                 failed += 1
             else:
-                yield (stamp - self._start) * 1e-9, message
+                yield time, message
         if failed:
             self._problems.append(
                 f"{channel.topic}: {failed} of {len(channel.messages)} messages can't be decoded"
