@@ -3,7 +3,8 @@
     python tools/run_tests.py [what pytest takes]
 
 The tests of tests/system start the nodes as processes, with a robot that moves in real time: they
-run last, two files at a time, alone on the machine. Both parts run to their end whatever fails.
+mostly wait for it, so they run beside the others, two files at a time, and print when both have
+ended. Both parts run to their end whatever fails.
 Paths and options are pytest's (`tests/planner -n0`, `-k energy`); a part whose paths are not asked
 for is left out.
 """
@@ -15,6 +16,7 @@ import re
 import subprocess
 import sys
 import time
+from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -23,7 +25,7 @@ from xml.etree import ElementTree
 ROOT = Path(__file__).resolve().parent.parent
 OUTPUT = ROOT / "out" / "tests"
 SYSTEM = "tests/system"
-MINUTES = 12  # on two quiet cores
+MINUTES = 8  # on two quiet cores
 WITH_VALUE = ("-k", "-m", "-n", "-p", "-W", "-o", "-c", "--dist", "--deselect", "--ignore")
 NOTHING_COLLECTED = 5  # pytest's exit code: the words may choose tests of one part only
 
@@ -39,6 +41,11 @@ class Part:
     def results(self) -> Path:
         """The file of their results."""
         return OUTPUT / f"{self.name}.xml"
+
+    @property
+    def log(self) -> Path:
+        """The file of what it prints where another part runs beside it."""
+        return OUTPUT / f"{self.name}.log"
 
     def command(self) -> list[str]:
         """The call of pytest."""
@@ -86,8 +93,25 @@ def without_workers(options: list[str]) -> list[str]:
 
 
 def run(chosen: list[Part]) -> dict[str, int]:
-    """Run one part after the other, whatever fails; exit codes by name."""
-    return {part.name: subprocess.run(part.command(), cwd=ROOT).returncode for part in chosen}
+    """Run the parts side by side, whatever fails; exit codes by name. The first prints as it goes,
+    what the others print follows when it has ended.
+    """
+    first, *others = chosen
+    with ExitStack() as ends:
+        beside = {part: begun(part, ends) for part in others}
+        codes = {first.name: subprocess.run(first.command(), cwd=ROOT).returncode}
+        for part, process in beside.items():
+            codes[part.name] = process.wait()
+            print(part.log.read_text(encoding="utf-8", errors="replace"), flush=True)
+    return codes
+
+
+def begun(part: Part, ends: ExitStack) -> subprocess.Popen[bytes]:
+    """A part that prints into its log, and is ended when `ends` closes."""
+    log = ends.enter_context(part.log.open("wb"))
+    process = subprocess.Popen(part.command(), cwd=ROOT, stdout=log, stderr=subprocess.STDOUT)
+    ends.callback(process.terminate)  # nothing where it has ended
+    return process
 
 
 def outcome(chosen: list[Part]) -> tuple[dict[str, int], list[str]]:

@@ -57,8 +57,25 @@ def test_a_part_that_fails_hides_no_other_and_the_summary_counts_both(
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    (tmp_path / "test_bad.py").write_text("def test_bad():\n    assert False\n")
-    (tmp_path / "test_good.py").write_text("def test_good():\n    pass\n")
+    """They run at the same time: each waits for the other to begin."""
+    for name, other, end in (("bad", "good", "assert False"), ("good", "bad", "assert True")):
+        (tmp_path / f"test_{name}.py").write_text(
+            f"""
+import time
+from pathlib import Path
+
+FOLDER = Path(__file__).parent
+
+
+def test_{name}():
+    (FOLDER / "{name}").touch()
+    until = time.monotonic() + 300.0
+    while not (FOLDER / "{other}").exists():
+        assert time.monotonic() < until
+        time.sleep(0.01)
+    {end}
+"""
+        )
     monkeypatch.setattr(tool, "OUTPUT", tmp_path)
     parts = [tool.Part(name, (str(tmp_path / f"test_{name}.py"),)) for name in ("bad", "good")]
     monkeypatch.setattr(tool, "parts", lambda words, cores: parts)
