@@ -7,14 +7,13 @@ one? Then the cell with these changes is planned; failures that remain are repor
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
-from ir_cli.planning import CEILING
+from ir_cli.planning import CEILING, clock
 from ir_cli.station_access import MARGIN, AccessLine, StationVisit, lines_of, visits
 from ir_description import AllowedContact, Cell, Equipment, Station, cell_to_yaml
 from ir_msgs_py.options import PlanOptions
@@ -308,7 +307,7 @@ def _planned(cell: Cell) -> Iterator[Suggestion]:
     """What the planner refuses: the program, and stations where it does not go, from park and
     back.
     """
-    planner = Planner(clock=time.monotonic)
+    planner = Planner(clock=clock)
     options = PlanOptions(planning_time=CEILING)
     planner.set_cell(text=cell_to_yaml(cell))
     visited = {step.target for step in cell.program}

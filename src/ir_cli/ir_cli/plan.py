@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-import time
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -29,6 +28,7 @@ from ir_cli.planning import (
     add_options,
     add_parameters,
     check_stations,
+    clock,
     configuration_of,
     failed,
     options_of,
@@ -178,7 +178,7 @@ def _planner(arguments: argparse.Namespace) -> Planner:
     from ir_cli.first_cell import first_cell
 
     settings = PlannerSettings(power_parameters=arguments.power_parameters)
-    planner = Planner(clock=time.monotonic, settings=settings)
+    planner = Planner(clock=clock, settings=settings)
     planner.set_cell(first_cell(arguments.robot))
     return planner
 

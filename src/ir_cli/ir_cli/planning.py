@@ -48,13 +48,16 @@ def sentences() -> Iterator[None]:
         raise InputError(str(error)) from error
 
 
+def clock() -> float:
+    """Time [s] by which planning at a terminal is limited; here alone, so that a test stops it."""
+    return time.monotonic()
+
+
 def planner_of(cell: str, power_parameters: str = "") -> Planner:
     """A planner with a cell: the name of a bundled one, or a file; power_parameters: a file, or
     "".
     """
-    planner = Planner(
-        clock=time.monotonic, settings=PlannerSettings(power_parameters=power_parameters)
-    )
+    planner = Planner(clock=clock, settings=PlannerSettings(power_parameters=power_parameters))
     try:
         load_cell(cell)
     except UnknownNameError as error:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 from ir_cli.plan import sentences_of
-from ir_cli.planning import CEILING
+from ir_cli.planning import CEILING, clock
 from ir_cli.view.clearance import StationAccess, station_accesses
 from ir_cli.view.playback import PlayedMotion, motion_of
 from ir_description import Cell, DescriptionError
@@ -187,7 +186,7 @@ class PlanWorker:
 
     def _plan(self, asked: ViewRequest) -> Planned:
         cell = asked.cell
-        planner = Planner(cell.name, clock=time.monotonic, read_cell=lambda text, file: cell)
+        planner = Planner(cell.name, clock=clock, read_cell=lambda text, file: cell)
 
         def old() -> bool:
             return self._latest != asked.number
@@ -221,7 +220,7 @@ class PlanWorker:
     def _compared(self, asked: ViewRequest) -> Planned:
         """Today's program against the planner's, as the page of `ir compare` has it."""
         cell = asked.cell
-        planner = Planner(cell.name, clock=time.monotonic, read_cell=lambda text, file: cell)
+        planner = Planner(cell.name, clock=clock, read_cell=lambda text, file: cell)
 
         def progress(phase: str, done: int, total: int, cost: float) -> None:
             self._stop_if_old(asked)
