@@ -6,48 +6,43 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.resources import files
 from typing import Any
 
 from ir_recorder.report.number_text import text
-from ir_recorder.report.page import asset
+from ir_recorder.report.shell import Answer, badge, shell
 from ir_recorder.report.tables import table
 
-_BUTTON = (
-    '<button id="theme" type="button" title="light or dark" aria-label="light or '
-    'dark">\u25d0</button>'
-)
+
+@dataclass(frozen=True)
+class Head:
+    """The head of a study's page. answer: None where nothing was found; verdict: beside the title,
+    "" without one; good: whether it is green.
+    """
+
+    title: str
+    subtitle: str
+    answer: Answer | None = None
+    verdict: str = ""
+    good: bool = False
 
 
-def page(kind: str, parts: Mapping[str, str]) -> str:
-    """The page of a kind of study as text. parts: HTML by the names in its page.html, title and
-    subtitle; where they have a script, it answers the button for light and dark.
+def page(kind: str, head: Head, parts: Mapping[str, str], script: str = "") -> str:
+    """The page of a kind of study as text. parts: HTML by the names in its page.html; a script of
+    its own answers the button for light and dark.
     """
     own = files("ir_studies") / kind
-    shell = (files("ir_studies") / "page.html").read_text("utf-8")
-    scripts = f"{asset('charts.js')}\n{asset('export.js')}"
-    plain = f"<script>{scripts}\nthemes(() => {{}}, () => {{}});\nexportButtons();</script>\n"
-    inner = {
-        "button": _BUTTON,
-        "export": "" if "script" in parts else plain,
-        "style": asset("page.css"),
-        "own_style": (own / "page.css").read_text("utf-8"),
-        "badge": "",
-        "lead": "",
-        "main": _filled((own / "page.html").read_text("utf-8"), parts),
-    }
-    return _filled(shell, {**inner, **parts})
-
-
-def badge(words: str, *, good: bool) -> str:
-    """The verdict of a study beside its title: green, or open."""
-    style = "good" if good else "open"
-    return f'<div class="badges"><p class="verdict {style}">{text(words)}</p></div>'
-
-
-def lead(words: str) -> str:
-    """What a study found, in plain words above all figures."""
-    return f'<section id="lead"><p>{text(words)}</p></section>\n'
+    first = head.answer.html() if head.answer is not None else ""
+    main = _filled((own / "page.html").read_text("utf-8"), parts)
+    return shell(
+        head.title,
+        head.subtitle,
+        first + main,
+        badges=[badge(head.verdict, "good" if head.good else "open")] if head.verdict else [],
+        style=(own / "page.css").read_text("utf-8"),
+        script=script,
+    )
 
 
 def settings_table(settings: Mapping[str, Any]) -> str:

@@ -393,7 +393,9 @@ def _span_of_money(low: float, high: float, least: float) -> str:
     def show(value: float) -> str:
         if whole:
             return f"{value:,.0f}".replace(",", " ")
-        return money(value if abs(value) >= least else 0.0, "").strip()
+        if abs(value) < least:
+            return "0"
+        return f"{value:.2f}" if least == _NOTHING else money(value, "").strip()
 
     return span_of(low, high, show)
 

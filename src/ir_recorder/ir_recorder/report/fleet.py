@@ -36,9 +36,11 @@ from ir_recorder.report.costs import (
     IdleSaving,
     assumed_section,
     counted_with,
+    demand_money,
     idle_money,
     idle_saving,
     idle_sentence,
+    money,
     small_span,
     yearly_money,
     yearly_span,
@@ -53,16 +55,16 @@ from ir_recorder.report.number_text import (
     kilowatt_hours,
     modes_as_words,
     percent,
-    seconds,
     significant,
     text,
     watts,
     yearly_kilowatt_hours,
 )
-from ir_recorder.report.page import PAGE_START, asset, folded
+from ir_recorder.report.page import PAGE_START, folded
 from ir_recorder.report.paid import Paid, Tile, row_of
+from ir_recorder.report.shell import Answer, badge, shell
 from ir_recorder.report.step_table import TableValue, write_columns
-from ir_recorder.report.tables import table
+from ir_recorder.report.tables import COMPACT, bar, table
 from ir_recorder.report.whole_line import WholeLine, line_section, of_whole_line
 from ir_values.errors import FileRefusedError, IrError
 from ir_values.files import ANYWHERE, FileRoots
@@ -365,8 +367,10 @@ def _summed(
     return dict(sorted(found.items(), key=lambda item: -sum(item[1].values())))
 
 
-# The page of a fleet: tables with sums, and bars of each robot's year.
+# The page of a fleet: a year of all robots and what to do about it, then each robot with what to
+# change first, then sums.
 
+_MOST_ROBOTS = 8  # of the first table, those that cost most: the rest is one row there
 _ROWS = 40  # of movements: the rest is one row
 _COLUMNS = 5  # of robots, those that take most: the rest is one column; the table has them all
 REST = "all others"
@@ -392,60 +396,142 @@ def fleet_html(
     known = at_mains(members)
     summed = [robot for robot in robots if not robot.drives_only]
     sections = [
-        _section("Robots", _robots(robots, prices)),
-        _section("Peak, and when nobody works", _around_the_clock(members, robots, prices)),
+        _section("Robots, those that cost most first", _robots(members, robots, prices), "robots"),
+        _section("What to change first", _potential(known, summed, prices)),
         _section("Month by month: driven and predicted", _months(members)),
-        _section("What could be saved, by measure", _potential(known, summed, prices)),
-        line_section(fleet_of_line(members, prices), prices),
-        folded(
-            _section("By power mode", _matrix("mode", by_mode(known, prices), summed)), paper=True
-        ),
+        _problems(left_out),
+        _all_robots(members, robots, prices),
+        folded(_section("Peak, and when nobody works", _around_the_clock(members, robots, prices))),
+        folded(line_section(fleet_of_line(members, prices), prices)),
+        folded(_section("By power mode", _matrix("mode", by_mode(known, prices), summed))),
         folded(
             _section(
                 "By movement and pause", _matrix("movement", by_movement(known, prices), summed)
-            ),
-            paper=True,
+            )
         ),
+        assumed_section(prices),
     ]
-    title = f"{counted(len(robots), 'robot')}, {counted(len(members), 'recording')}"
-    head = (
-        '<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
-    )
-    return (
-        f'<!doctype html><html lang="en"><head>{head}<title>{text(title)}</title>'
-        f"<style>{asset('page.css')}</style></head><body><header><div><h1>{text(title)}</h1>"
-        f'<p class="subtitle">{text(_origins(members))}; a year of each robot, one cycle after '
-        "the other</p>"
-        f"</div></header><main>{_paid(known, prices)}{_tiles(robots, prices)}"
-        f"{_problems(left_out)}{''.join(sections)}"
-        f"{assumed_section(prices)}</main>"
-        f"<script>{asset('export.js')}\nexportButtons();</script></body></html>"
+    paid = _paid(known, prices)
+    first = _answer(paid, robots, prices).html()
+    year = paid.picture(prices, "Energy costs of a year")
+    shown = [tile for tile in _tiles(paid, known, robots, prices) if tile is not None]
+    return shell(
+        f"{counted(len(robots), 'robot')}, {counted(len(members), 'recording')}",
+        "a year of each robot, one cycle after the other",
+        f"{first}{year}{row_of(shown) if shown else ''}{''.join(sections)}",
+        badges=[f'<p class="source open">{text(_origins(members))}</p>', _badge(paid)],
     )
 
 
-def _tiles(robots: Sequence[Robot], costs: Costs) -> str:
-    """A year of the fleet in two figures."""
+def _answer(paid: Paid, robots: Sequence[Robot], costs: Costs) -> Answer:
+    """What all robots together save in a year, how sure that is, and in which order."""
     summed = [robot for robot in robots if not robot.drives_only]
     if not summed:
-        return f'<p class="hint">{_apart(robots)}</p>'
+        return Answer("The costs of a year are not known", _apart(robots))
     yearly = sum_of([robot.yearly for robot in summed])
-    price = yearly_money(costs.money(yearly.value), costs.currency)
+    price = yearly.of(costs.money)
+    taken = f"{kilowatt_hours(yearly.value)}, {kilograms(costs.co2(yearly.value))} of CO2"
+    if paid.saved is None and paid.idle is None:
+        return Answer(
+            f"{yearly_money(price.value, costs.currency)} a year",
+            f"for the energy of {counted(len(summed), 'robot')} in shifts, as recorded: {taken}.",
+            _sure(price, costs),
+            "Plan their programs (ir plan CELL --saving -o plan.mcap) and name these files as "
+            "well: no recording says what a plan saves.",
+        )
+    year = paid.year(costs)
+    word, gain = year.money.gain()
+    less = "less" if word == "saved" else "more"
+    result = f"{yearly_money(gain.value, costs.currency)} {less} a year"
+    if paid.saved is not None and paid.saved.doubt:
+        result = f"Open whether anything is saved: {result}"
+    saved = year.with_energy(costs)
+    parts = [f"of {counted(len(summed), 'robot')} together", f"{saved} {less}" if saved else ""]
+    words = ", ".join(part for part in parts if part)
+    return Answer(result, f"{words}.", _sure_of(paid, costs), _steps(paid, robots, costs))
+
+
+def _sure(price: Amount, costs: Costs) -> str:
+    between = yearly_span(price.low, price.high)
+    return f"90 % interval {between} {costs.currency}." if price.low < price.high else ""
+
+
+def _sure_of(paid: Paid, costs: Costs) -> str:
+    """How sure a saving is: its interval, and what each part of it rests on."""
+    said = []
+    if paid.saved is not None:
+        _, gain = paid.year(costs).money.gain()
+        said += [_sure(gain, costs), "What plans save is predicted."]
+    if paid.idle is not None:
+        said.append(f"What nights save is {paid.idle.basis}, and counted as sure.")
+    return " ".join(each for each in said if each)
+
+
+def _steps(paid: Paid, robots: Sequence[Robot], costs: Costs) -> str:
+    """What to do first, and then."""
+    found: list[tuple[float, str]] = []
+    if paid.idle is not None:
+        price = yearly_money(paid.idle.saved, costs.currency)
+        words = f"let them go into {paid.idle.mode} at night and at weekends ({price} a year)"
+        found.append((paid.idle.saved, words))
+    if paid.saved is not None and paid.saved.value > 0.0 and not paid.saved.doubt:
+        best = max(robots, key=lambda robot: robot.saved.value if robot.saved is not None else 0.0)
+        saved = costs.money(paid.saved.value)
+        price = yearly_money(saved, costs.currency)
+        found.append((saved, f"drive the plans ({price} a year), most is saved at {best.name}"))
+    found.sort(reverse=True)
+    if not found:
+        return "Keep the programs as they are."
+    then = f" Then {found[1][1]}." if len(found) > 1 else ""
+    return f"First {found[0][1]}.{then}" if then else f"{found[0][1].capitalize()}."
+
+
+def _badge(paid: Paid) -> str:
+    if paid.saved is None:
+        return badge("No plan's saving known", "open")
+    if paid.saved.doubt:
+        return badge("Open whether plans save", "open")
+    if paid.saved.value < 0.0:
+        return badge("The plans take more", "bad")
+    return badge("The plans save", "good")
+
+
+def _tiles(
+    paid: Paid, members: Sequence[Member], robots: Sequence[Robot], costs: Costs
+) -> list[Tile | None]:
+    """A year of the fleet as recorded, what is saved of it, and its largest quarter of an hour."""
+    summed = [robot for robot in robots if not robot.drives_only]
+    if not summed:
+        return []
+    yearly = sum_of([robot.yearly for robot in summed])
+    price = yearly.of(costs.money)
     of = f"{counted(len(summed), 'robot')}, in shifts, as recorded"
-    return row_of(
-        [
-            Tile("energy a year", kilowatt_hours(yearly.value), (of,)),
-            Tile("costs a year", price, (f"{kilograms(costs.co2(yearly.value))} of CO2", of)),
-        ]
+    energy = f"{kilowatt_hours(yearly.value)}, {kilograms(costs.co2(yearly.value))} of CO2"
+    costs_tile = Tile(
+        "costs a year",
+        yearly_money(price.value, costs.currency),
+        (_sure(price, costs).rstrip("."), energy, of),
     )
+    peak = sum(_demand(members, robot) for robot in summed)
+    demand = Tile(
+        "largest quarter of an hour",
+        watts(peak),
+        ("mean power, as if all robots' largest came at once", demand_money(peak, costs)),
+    )
+    return [costs_tile, *paid.parts(costs), demand]
 
 
-def _paid(members: Sequence[Member], costs: Costs) -> str:
+def _demand(members: Sequence[Member], robot: Robot) -> float:
+    return max(member.demand for member in members if member.robot == robot.name)
+
+
+def _paid(members: Sequence[Member], costs: Costs) -> Paid:
     """What those who pay ask first, of all robots together."""
     saved, common = _saved_and_common(members, costs)
     idle = _idle_saving(members, costs)
     robots = robots_of(members, costs)
     if saved is None:
-        return Paid(None, 0.0, idle, robots=len(robots)).html(costs)
+        return Paid(None, 0.0, idle, robots=len(robots))
     without = [robot.yearly.value for robot in robots if robot.saved is None]
     of = f", {counted(len(robots), 'robot')}"
     if without:
@@ -453,50 +539,87 @@ def _paid(members: Sequence[Member], costs: Costs) -> str:
     recorded = ("as recorded", sum_of([robot.yearly for robot in robots]).value)
     before = "common programs"
     before_them = common + sum(without)
-    paid = Paid(saved, before_them, idle, of, before, recorded, robots=len(robots))
-    return paid.html(costs)
+    return Paid(saved, before_them, idle, of, before, recorded, robots=len(robots))
 
 
-def _robots(robots: Sequence[Robot], costs: Costs) -> str:
-    rows = [
-        (
-            f"{text(robot.name)}<small>{text(robot.cell)}</small><small>"
-            f"{text(', '.join(robot.origins))}, {counted(robot.recordings, 'recording')}</small>"
-            + (f"<small>{DRIVES_ONLY}</small>" if robot.drives_only else ""),
-            *_yearly(robot.yearly, costs),
-            _saved(robot.saved, costs),
-            f"{seconds(robot.seconds)}<small>"
-            f"{text(kilowatt_hours(robot.joules / costs.parts_per_cycle))} a part</small>",
-        )
-        for robot in robots
-    ]
+_ROBOT_HEADS = (
+    "robot", ">costs a year", ">energy a year", ">saved a year, predicted",
+    ">saved a year at night", ">a part", "change first",
+)  # fmt: skip
+
+
+def _robots(members: Sequence[Member], robots: Sequence[Robot], costs: Costs) -> str:
+    """Those that cost most, each with what to change first; the others in one row."""
+    rows = [_robot_row(robot, members, costs) for robot in robots[:_MOST_ROBOTS]]
+    others = [robot for robot in robots[_MOST_ROBOTS:] if not robot.drives_only]
+    if others:
+        name = f"{counted(len(others), 'other robot')}<small>listed below</small>"
+        rows.append((name, *_sums(others, members, costs), DASH, DASH))
     summed = [robot for robot in robots if not robot.drives_only]
-    saved = [robot.saved for robot in summed if robot.saved is not None]
-    if summed:
-        rows.append(
-            (
-                "<b>all</b><small>"
-                f"{counted(sum(robot.recordings for robot in summed), 'recording')}</small>",
-                *_yearly(sum_of([robot.yearly for robot in summed]), costs),
-                _saved(sum_of(saved) if saved else None, costs),
-                "",
-            )
-        )
-    heads = (
-        "robot",
-        ">costs a year",
-        ">energy a year",
-        ">saved a year, predicted",
-        ">a cycle",
-    )
+    if len(summed) > 1:
+        recordings = counted(sum(robot.recordings for robot in summed), "recording")
+        name = f"<b>all</b><small>{recordings}</small>"
+        rows.append((name, *_sums(summed, members, costs), DASH, DASH))
     hint = (
-        "A year is one cycle after the other in shifts, pauses at full length, without nights and "
-        "weekends. What plans save is predicted, against the same stations by PTP at full speed "
-        "and the controller's own timers; intervals hold 90 %, and those of several robots add up "
-        "as if all were wrong alike."
+        "A year is one cycle after the other in shifts, pauses at full length. Common programs: "
+        "the same stations by PTP at full speed, the controller's own timers. Small: 90 % "
+        "intervals, which add up as if all were wrong alike. Open: zero lies in the interval."
     )
-    hint = f"{hint} {counted_with(costs)} {_apart(robots)}"
-    return f'<p class="hint">{hint}</p>{table(heads, rows, "Robots")}'
+    hint = f"{text(hint)} {counted_with(costs)} {_apart(robots)}"
+    return f'{table(_ROBOT_HEADS, rows, "Robots")}<p class="hint">{hint}</p>'
+
+
+def _all_robots(members: Sequence[Member], robots: Sequence[Robot], costs: Costs) -> str:
+    """Every robot, folded; "" where the first table has them."""
+    if len(robots) <= _MOST_ROBOTS:
+        return ""
+    rows = [_robot_row(robot, members, costs) for robot in robots[_MOST_ROBOTS:]]
+    name = f"The other {counted(len(rows), 'robot')}"
+    return folded(_section(name, table(_ROBOT_HEADS, rows, name)))
+
+
+def _robot_row(robot: Robot, members: Sequence[Member], costs: Costs) -> tuple[str, ...]:
+    own = _own(members, robot)
+    idle = None if robot.drives_only else _idle_saving(own, costs)
+    part = robot.joules / costs.parts_per_cycle
+    made = f"{', '.join(robot.origins)}, {counted(robot.recordings, 'recording')}"
+    return (
+        f"{text(robot.name)}<small>{text(robot.cell)}</small><small>{text(made)}</small>"
+        + (f"<small>{DRIVES_ONLY}</small>" if robot.drives_only else ""),
+        *_yearly(robot.yearly, costs),
+        _saved(robot.saved, costs),
+        DASH if idle is None else f"<b>{text(yearly_money(idle.saved, costs.currency))}</b>",
+        f"{text(kilowatt_hours(part))}<small>"
+        f"{text(money(costs.money(part), costs.currency))}</small>",
+        text(_first_lever(robot, own, idle, costs)),
+    )
+
+
+def _first_lever(robot: Robot, own: Sequence[Member], idle: IdleSaving | None, costs: Costs) -> str:
+    """What saves most: rest outside of the shifts, its plan, or, without a plan, a measure."""
+    found: list[tuple[float, str]] = []
+    if idle is not None:
+        found.append((idle.saved, f"{idle.mode} at night"))
+    if robot.saved is not None and robot.saved.value > 0.0 and not robot.saved.doubt:
+        found.append((costs.money(robot.saved.value), "drive its plan"))
+    if robot.saved is None:
+        found += [
+            (costs.money(sum(each.values())), f"{name} (at most)")
+            for name, each in by_measure(own, costs).items()
+        ]
+    return max(found)[1] if found else DASH
+
+
+def _sums(robots: Sequence[Robot], members: Sequence[Member], costs: Costs) -> tuple[str, ...]:
+    """Costs, energy and savings of several robots."""
+    saved = [robot.saved for robot in robots if robot.saved is not None]
+    nights = [_idle_saving(_own(members, robot), costs) for robot in robots]
+    night = sum(idle.saved for idle in nights if idle is not None)
+    return (
+        *_yearly(sum_of([robot.yearly for robot in robots]), costs),
+        _saved(sum_of(saved) if saved else None, costs),
+        f"<b>{text(yearly_money(night, costs.currency))}</b>" if night > 0.0 else DASH,
+    )
 
 
 def _apart(robots: Sequence[Robot]) -> str:
@@ -518,7 +641,7 @@ def _around_the_clock(members: Sequence[Member], robots: Sequence[Robot], costs:
     idle: dict[str, list[float]] = {mode: [] for mode in modes}
     for robot in robots:
         own = [member for member in members if member.robot == robot.name]
-        demand = max(member.demand for member in own)
+        demand = _demand(members, robot)
         if not robot.drives_only:
             demands.append(demand)
         energies = []
@@ -618,25 +741,32 @@ def _shown(name: str) -> str:
 
 
 def _yearly(amount: Amount, costs: Costs) -> tuple[str, str]:
-    """Price of a year, and its energy with interval and CO2."""
+    """Price of a year, and its energy, each with its interval."""
+    price = amount.of(costs.money)
+    between = ""
+    if price.low < price.high:
+        between = (
+            f"<small>{text(yearly_span(price.low, price.high))} {text(costs.currency)}</small>"
+        )
     return (
-        f"<b>{text(yearly_money(costs.money(amount.value), costs.currency))}</b>",
-        f"<b>{text(kilowatt_hours(amount.value))}</b>{small_span(amount, kilowatt_hours)}"
-        f"<small>{text(kilograms(costs.co2(amount.value)))} of CO2</small>",
+        f"<b>{text(yearly_money(price.value, costs.currency))}</b>{between}",
+        f"<b>{text(kilowatt_hours(amount.value))}</b>{small_span(amount, kilowatt_hours)}",
     )
 
 
 def _saved(amount: Amount | None, costs: Costs) -> str:
+    """What is saved, with its interval; where zero lies in it, that it is open."""
     if amount is None:
         return DASH
     word, amount = amount.gain()
-    price = yearly_money(costs.money(amount.value), costs.currency)
-    doubt = f"<small>{amount.doubt}</small>" if amount.doubt else ""
-    energy = f"{kilowatt_hours(amount.value)}{' more' if word == 'more' else ''}"
     between = ""
     if amount.high > amount.low:
         between = f"<small>{text(_money_between(amount, costs))} {text(costs.currency)}</small>"
-    return f"<b>{text(price)}</b><small>{text(energy)}</small>{between}{doubt}"
+    if amount.doubt:
+        return f'<span title="{text(amount.doubt)}">open</span>{between}'
+    price = yearly_money(costs.money(amount.value), costs.currency)
+    energy = f"{kilowatt_hours(amount.value)}{' more' if word == 'more' else ''}"
+    return f"<b>{text(price)}</b><small>{text(energy)}</small>{between}"
 
 
 def _money_between(amount: Amount, costs: Costs) -> str:
@@ -668,40 +798,59 @@ def _row(name: str, own: Mapping[str, float], robots: Sequence[Robot]) -> tuple[
     return (text(_shown(name)), *cells, f"<b>{text(yearly_kilowatt_hours(sum(own.values())))}</b>")
 
 
+_LITTLE = 0.01  # of the largest measure: less is only named
+
+
 def _potential(members: Sequence[Member], robots: Sequence[Robot], costs: Costs) -> str:
-    found = by_measure(members, costs)
+    """Measures by what they save at most, and the robot at which each saves most."""
+    found: list[tuple[float, str, Mapping[str, float]]] = [
+        (costs.money(sum(own.values())), text(_shown(name)), own)
+        for name, own in by_measure(members, costs).items()
+    ]
+    found += _night(members, robots, costs)
     if not found:
         return '<p class="empty">No recording says it.</p>'
-    priced = [
-        (costs.money(sum(own.values())), _row(name, own, robots)) for name, own in found.items()
+    found.sort(key=lambda measure: -measure[0])
+    most = max(found[0][0], 1e-9)
+    rows = [
+        (
+            f"{name}<small>most at {text(max(own, key=lambda robot: own[robot]))}</small>",
+            f"<b>{text(yearly_money(price, costs.currency))}</b>"
+            f"<small>{text(yearly_kilowatt_hours(sum(own.values())))}</small>",
+            bar(price, most, "planned"),
+        )
+        for price, name, own in found
+        if price >= _LITTLE * most
     ]
-    priced += _night_row(members, robots, costs)
-    priced.sort(key=lambda row: -row[0])
-    rows = [(*cells, text(yearly_money(price, costs.currency))) for price, cells in priced]
-    heads = ("measure", *_robot_heads(robots), ">all", ">a year, at most")
+    heads = ("what", ">a year, at most", "")
     hint = "Upper bounds, each by itself: together they count some joules twice."
-    return f'<p class="hint">{hint}</p>{table(heads, rows, "kWh a year by measure")}'
+    little = [name for price, name, _ in found if price < _LITTLE * most]
+    if little:
+        hint += f" Less than {100.0 * _LITTLE:g} % of the largest: {', '.join(little)}."
+    return f'{table(heads, rows, "What to change first", COMPACT)}<p class="hint">{hint}</p>'
 
 
-def _night_row(
+def _night(
     members: Sequence[Member], robots: Sequence[Robot], costs: Costs
-) -> list[tuple[float, tuple[str, ...]]]:
-    """Rest outside of the shifts as a measure, with its money; none where it saves nothing."""
+) -> list[tuple[float, str, Mapping[str, float]]]:
+    """Rest outside of the shifts as a measure; none where it saves nothing."""
     together = _idle_saving(members, costs)
     if together is None:
         return []
     own = {robot.name: _idle_saving(_own(members, robot), costs) for robot in robots}
     energies = {name: idle.energy for name, idle in own.items() if idle is not None}
-    name = f"at night and at weekends: {together.mode} instead of closed brakes, {together.basis}"
-    return [(together.saved, _row(name, energies, robots))]
+    basis = f"{together.mode} instead of closed brakes, {together.basis}"
+    name = f"at night and at weekends<small>{text(basis)}</small>"
+    return [(together.saved, name, energies)]
 
 
 def _own(members: Sequence[Member], robot: Robot) -> list[Member]:
     return [member for member in members if member.robot == robot.name]
 
 
-def _section(title: str, content: str) -> str:
-    return f"<section><h2>{text(title)}</h2>{content}</section>"
+def _section(title: str, content: str, name: str = "") -> str:
+    called = f' id="{name}"' if name else ""
+    return f"<section{called}><h2>{text(title)}</h2>{content}</section>"
 
 
 def _origins(members: Sequence[Member]) -> str:

@@ -150,7 +150,7 @@ def folded(section: str, *, paper: bool = False) -> str:
     """
     kind = "part paper" if paper else "part"
     return re.sub(
-        r"<section( id=\"\w+\")?><h2>(.*?)</h2>(.*)</section>",
+        r"<section( id=\"[\w-]+\")?><h2>(.*?)</h2>(.*)</section>",
         rf'<details class="{kind}"\1><summary><h2>\2</h2></summary>\3</details>',
         section,
         flags=re.DOTALL,

@@ -64,18 +64,31 @@ class Paid:
         shown = self.tiles(costs)
         return self.picture(costs) + row_of(shown) if shown else ""
 
-    def picture(self, costs: Costs) -> str:
-        """A year before and after, with its message as the head; "" where the saving isn't
-        known.
+    def parts(self, costs: Costs) -> list[Tile]:
+        """What is saved in shifts and outside of them, each by itself."""
+        return [tile for tile in (self._saved(costs), self._idle(costs)) if tile is not None]
+
+    def _headline(self, costs: Costs) -> str:
+        """What is saved of a year in all, in money and energy."""
+        year = self.year(costs)
+        word, gain = year.money.gain()
+        less = "less" if word == "saved" else "more"
+        parts = (yearly_money(gain.value, costs.currency), year.with_energy(costs))
+        head = f"{', '.join(part for part in parts if part)} {less} a year"
+        if self.saved is not None and self.saved.doubt:
+            return f"It is open whether anything is saved: {head}"
+        return head
+
+    def picture(self, costs: Costs, head: str = "") -> str:
+        """A year before and after, with its message as the head unless there is another; "" where
+        the saving isn't known.
         """
         if self.saved is None:
             return ""
         nights = (0.0, 0.0) if self.idle is None else (self.idle.left_alone, self.idle.deepest)
         shifts = costs.money(self.common), costs.money(self.common - self.saved.value)
         before = shifts[0] + nights[0]
-        year = self._year(costs)
-        saved = year.money
-        word, gain = saved.gain()
+        saved = self.year(costs).money
         ends = (before - saved.high, before - saved.low)
         sure = f"90 % interval {yearly_span(*ends)} {costs.currency}" if ends[0] < ends[1] else ""
         rows = [
@@ -85,23 +98,17 @@ class Paid:
         if self.driven is not None:
             name, energy = self.driven
             rows.append(_year_row(name, "driven", (costs.money(energy), nights[1]), costs))
-        less = "less" if word == "saved" else "more"
-        parts = (yearly_money(gain.value, costs.currency), year.with_energy(costs))
-        head = f"{', '.join(part for part in parts if part)} {less} a year"
-        if saved.doubt:
-            head = f"It is open whether anything is saved: {head}"
         pale = " Pale: at night and at weekends." if self.idle is not None else ""
         whisker = " Whisker: 90 % interval of what is saved." if sure else ""
         hint = f"Energy costs of a year. In full colour: in shifts{self.counted}.{pale}{whisker}"
         return (
-            f'<section id="year"><h2>{text(head)}</h2>{bars(rows, "energy costs of a year")}'
-            f'<p class="hint">{text(hint)}</p></section>'
+            f'<section id="year"><h2>{text(head or self._headline(costs))}</h2>'
+            f'{bars(rows, "energy costs of a year")}<p class="hint">{text(hint)}</p></section>'
         )
 
-    def _year(self, costs: Costs) -> SavedYear:
-        """What is saved of a year in all."""
-        assert self.saved is not None
-        return saved_year(self.saved, self.idle, costs)
+    def year(self, costs: Costs) -> SavedYear:
+        """What is saved of a year in all; what isn't known counts as nothing."""
+        return saved_year(self.saved or Amount(0.0, 0.0, 0.0), self.idle, costs)
 
     def _saved(self, costs: Costs) -> Tile | None:
         if self.saved is None:
@@ -115,7 +122,7 @@ class Paid:
             f"{share} {less}, {energy}",
             gain.doubt,
             self.supply,
-            payback(self._year(costs).money, costs) if self.idle is None else "",
+            payback(self.year(costs).money, costs) if self.idle is None else "",
         )
         price = yearly_money(costs.money(gain.value), costs.currency)
         return Tile(f"{word} a year in shifts, by the plan", price, notes)
@@ -138,7 +145,7 @@ class Paid:
     def _both(self, costs: Costs) -> Tile | None:
         if self.saved is None or self.idle is None:
             return None
-        year = self._year(costs)
+        year = self.year(costs)
         word, gain = year.money.gain()
         price = yearly_money(gain.value, costs.currency)
         today = costs.money(self.common) + self.idle.left_alone

@@ -248,9 +248,11 @@ def problem_list(problems: Sequence[str]) -> str:
 
 
 def _cells(heads: Sequence[str], row: Sequence[str]) -> str:
-    """Each cell with its head, which a narrow screen shows beside it."""
+    """Each cell with its head, which a narrow screen shows beside it; there what isn't known is
+    left out.
+    """
     return "".join(
-        f'<td{_number(head)} data-head="{text(head.lstrip(">"))}">{cell}</td>'
+        f'<td{_number(head, cell)} data-head="{text(head.lstrip(">"))}">{cell}</td>'
         for head, cell in zip(heads, row, strict=True)
     )
 
@@ -271,8 +273,9 @@ def bar(value: float, most: float, kind: str) -> str:
     return f'<span class="bar {text(kind)}" style="width:{width:.1f}%"></span>'
 
 
-def _number(head: str) -> str:
-    return ' class="n"' if head.startswith(">") else ""
+def _number(head: str, cell: str = "") -> str:
+    kinds = [name for name, is_so in (("n", head.startswith(">")), ("no", cell == DASH)) if is_so]
+    return f' class="{" ".join(kinds)}"' if kinds else ""
 
 
 # Checks as tables: for each kind the one that is nearest to its bound, then the checks

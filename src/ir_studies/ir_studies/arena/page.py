@@ -25,6 +25,7 @@ from ir_recorder.report.page import PAGE_START, asset
 from ir_recorder.report.paid import Tile, row_of
 from ir_recorder.report.series import Curves, Json, packed
 from ir_recorder.report.shapes import body_mesh, capsule_mesh
+from ir_recorder.report.shell import Answer
 from ir_recorder.report.tables import table
 from ir_studies.arena.figures import (
     GRID,
@@ -40,7 +41,7 @@ from ir_studies.arena.figures import (
     success_over_time,
 )
 from ir_studies.arena.settings import PORTFOLIO, ArenaSettings, settings_text
-from ir_studies.page import badge, lead, page
+from ir_studies.page import Head, page
 from ir_values.arrays import FloatArray
 from ir_values.files import ANYWHERE
 
@@ -136,11 +137,13 @@ def page_html(runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int = 
     blocked, _ = blocked_and_free(runs)
     shown = blocked or runs
     end = min(longest(shown), settings.seconds)  # what comes after these doesn't count
+    head = Head(
+        "Arena",
+        _subtitle(runs, settings, missing),
+        _answer(every, runs, settings),
+        *_verdict(runs, settings),
+    )
     parts = {
-        "title": "Arena",
-        "subtitle": text(_subtitle(runs, settings, missing)),
-        "badge": _badge(runs, settings),
-        "lead": _lead(every, runs, settings),
         "time_value": _second(settings.time_value),
         "tiles": _tiles(every),
         "solved": _solved_bars(every),
@@ -162,9 +165,8 @@ def page_html(runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int = 
             {"end": end, "axes": list(_curves(shown, titles, settings.planners, end))},
             separators=(",", ":"),
         ).replace("<", "\\u003c"),
-        "script": "\n".join(asset(script) for script in SCRIPTS),
     }
-    return page("arena", parts)
+    return page("arena", head, parts, "\n".join(asset(script) for script in SCRIPTS))
 
 
 def _subtitle(runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int) -> str:
@@ -183,11 +185,11 @@ def _second(time_value: float) -> str:
     return "each robot's own price [W]" if time_value == ROBOTS_TIME_VALUE else f"{time_value:g} W"
 
 
-def _lead(found: Sequence[Figures], runs: Sequence[ArenaRun], settings: ArenaSettings) -> str:
+def _answer(found: Sequence[Figures], runs: Sequence[ArenaRun], settings: ArenaSettings) -> Answer:
     """What was asked, who won, and what that means for the choice of a planner."""
     known = [one for one in found if one.solved]
     if not known:
-        return lead("No planner solved any run.")
+        return Answer("No planner solved any run.", "")
     asked = len({run.entry.question for run in runs})
     best = max(known, key=lambda one: (one.success, -one.cost_ratio))
     above = 100.0 * (best.cost_ratio - 1.0)
@@ -198,11 +200,11 @@ def _lead(found: Sequence[Figures], runs: Sequence[ArenaRun], settings: ArenaSet
         f"trajectories cost least, in the median {above:.2f} % above the best known."
     )
     if not _judged(settings):
-        return lead(said)
+        return Answer(said, "")
     means = f"In cells like these {best.planner} may be named instead of the default, {PORTFOLIO}."
     if best.planner == PORTFOLIO:
         means = "It is the default: in cells like these no planner need be named."
-    return lead(f"{said} {means}")
+    return Answer(f"{said} {means}", "")
 
 
 def _bindings(runs: Sequence[ArenaRun], planners: Sequence[str]) -> str:
@@ -255,12 +257,12 @@ def _judged(settings: ArenaSettings) -> bool:
     return PORTFOLIO in settings.planners and len(settings.planners) > 1
 
 
-def _badge(runs: Sequence[ArenaRun], settings: ArenaSettings) -> str:
+def _verdict(runs: Sequence[ArenaRun], settings: ArenaSettings) -> tuple[str, bool]:
     if not _judged(settings):
-        return ""
+        return "", False
     if behind(runs, settings):
-        return badge("The portfolio is not ahead everywhere", good=False)
-    return badge("Nobody is ahead of the portfolio", good=True)
+        return "The portfolio is not ahead everywhere", False
+    return "Nobody is ahead of the portfolio", True
 
 
 def verdict(runs: Sequence[ArenaRun], settings: ArenaSettings) -> str:

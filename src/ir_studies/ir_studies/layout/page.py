@@ -31,13 +31,14 @@ from ir_recorder.report.number_text import (
 from ir_recorder.report.page import PAGE_START
 from ir_recorder.report.paid import Tile, row_of
 from ir_recorder.report.shapes import body_mesh, capsule_mesh
+from ir_recorder.report.shell import Answer
 from ir_recorder.report.step_table import write_columns
 from ir_recorder.report.tables import table
 from ir_studies.layout.placement import Known, Variable
 from ir_studies.layout.search import GIVEN
 from ir_studies.layout.settings import LayoutSettings, PlacementCondition
 from ir_studies.layout.summary import Final, cost_words, ends, of_condition, sentences
-from ir_studies.page import lead, page, settings_table
+from ir_studies.page import Head, page, settings_table
 from ir_values.arrays import FloatArray
 from ir_values.files import ANYWHERE
 
@@ -222,16 +223,16 @@ def page_html(
     said = "".join(
         f"<li>{text(_briefly(one, finals))}</li>" for one in sentences(known, finals, settings)
     )
+    head = Head(
+        f"Layout of {cell.name}",
+        f"{len(known)} placements, {len(settings.variables)} variables; energies are predicted",
+        _answer(finals, costs),
+        "Predicted, not driven",
+    )
     parts = {
-        "title": f"Layout of {text(cell.name)}",
-        "subtitle": text(
-            f"{len(known)} placements, {len(settings.variables)} variables; energies are predicted"
-        ),
         "tiles": _tiles(known, finals, costs),
         "bars": _bars(finals),
         "assumed": assumed_section(costs),
-        "badge": '<div class="badges"><p class="source open">Predicted, not driven</p></div>',
-        "lead": _lead(finals, costs),
         "verdict": f"<ul>{said}</ul>",
         "best": table(_HEADS, _rows(finals), "The best placements"),
         "map": "".join(_maps(known, finals, settings, cell)),
@@ -242,26 +243,28 @@ def page_html(
         "impossible": _impossible(known),
         "settings": settings_table(asdict(settings)),
     }
-    return page("layout", parts)
+    return page("layout", head, parts)
 
 
-def _lead(finals: Sequence[Sequence[Final]], costs: Costs) -> str:
+def _answer(finals: Sequence[Sequence[Final]], costs: Costs) -> Answer | None:
     """Whether moving anything pays, in money of a year; "" where there is nothing to compare."""
     given, best = ends(finals)
     if given is None or best is None:
-        return ""
+        return None
     like = of_condition(given, best[0])
     less, within = best[0].saving(like)
     year = costs.money(less * costs.cycles_per_year(like.mean("duration_s")))
     span = span_of(within.low, within.high, kilowatt_hours)
     saved = f"{kilowatt_hours(less)} of {kilowatt_hours(like.mean())} a cycle, {span}"
     if less <= 0.0 or within.low <= 0.0:
-        return lead("No placement is shown to save energy: leave everything where it stands.")
+        return Answer("No placement is shown to save energy: leave everything where it stands.", "")
     said = f"The best placement saves {yearly_money(year, costs.currency)} a year ({saved})"
     if year < costs.engineer_hour:
         hour = f"{costs.engineer_hour:g} {costs.currency}"
-        return lead(f"{said}, less than one hour of an engineer ({hour}): nothing is worth moving.")
-    return lead(f"{said}.")
+        return Answer(
+            f"{said}, less than one hour of an engineer ({hour}): nothing is worth moving.", ""
+        )
+    return Answer(f"{said}.", "")
 
 
 def _beside(finals: Sequence[Sequence[Final]], settings: LayoutSettings) -> str:

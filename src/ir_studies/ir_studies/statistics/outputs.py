@@ -15,9 +15,10 @@ from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import DASH, significant, text
 from ir_recorder.report.page import PAGE_START
 from ir_recorder.report.paid import Tile, row_of
+from ir_recorder.report.shell import Answer
 from ir_recorder.report.step_table import write_columns
 from ir_recorder.report.tables import table
-from ir_studies.page import badge, lead, page, settings_table
+from ir_studies.page import Head, page, settings_table
 from ir_studies.statistics.findings import ASYNCHRONOUS, SYNCHRONOUS, Comparison, Findings, number
 from ir_studies.statistics.settings import DRAWN, StatisticsSettings
 from ir_studies.work import Row
@@ -280,14 +281,15 @@ def _flat(rows: Sequence[Row]) -> Iterator[dict[str, str | float | int]]:
 
 def page_html(found: Findings, settings: StatisticsSettings) -> str:
     """The page as text."""
+    head = Head(
+        "Statistics",
+        f"{settings.cell}: {found.pairs} random pairs of places, planner "
+        f"{settings.planner or 'portfolio'}, objective {settings.objective}, "
+        f"robot {settings.plant}",
+        _answer(found),
+        *_verdict(found),
+    )
     parts = {
-        "title": "Statistics",
-        "subtitle": text(
-            f"{settings.cell}: {found.pairs} random pairs, planner "
-            f"{settings.planner or 'portfolio'}, "
-            f"objective {settings.objective}, plant {settings.plant}"
-        ),
-        "badge": _badge(found),
         "tiles": row_of(_tiles(found)),
         "counts": table(("", ">how many"), [(text(a), b) for a, b in counts(found)], "Counts"),
         "verdict": "".join(f"<li>{text(one)}</li>" for one in _in_words(found)),
@@ -304,22 +306,23 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
         "agreement_dots": dots(
             found.agreements, "predicted or indirect less direct, in percent of direct"
         ),
-        "lead": _lead(found),
         "settings": settings_table(settings.budget),
     }
-    return page("statistics", parts)
+    return page("statistics", head, parts)
 
 
-def _lead(found: Findings) -> str:
+def _answer(found: Findings) -> Answer | None:
+    """How true predicted energies are, how sure that is, and what follows for users."""
     words = prediction_words(found)
-    return lead(words) if words else ""
+    return Answer(words, "") if words else None
 
 
-def _badge(found: Findings) -> str:
+def _verdict(found: Findings) -> tuple[str, bool]:
+    """The badge: whether the timings differ."""
     shown = sum(each.shown for each in found.comparisons)
     if not shown:
-        return badge("Timings: no difference shown", good=False)
-    return badge(f"Timings: {counted(shown, 'difference')} shown", good=True)
+        return "Timings: no difference shown", False
+    return f"Timings: {counted(shown, 'difference')} shown", True
 
 
 def prediction_words(found: Findings) -> str:

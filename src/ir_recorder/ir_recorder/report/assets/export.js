@@ -18,7 +18,7 @@ const QUOTE = String.fromCharCode(34);
 /* A spreadsheet takes a text that begins with = + - @ for a formula: such a text gets an apostrophe, a number none. */
 function csvCell(cell) {
   const parts = [...cell.childNodes].map((node) => node.textContent.trim()).filter(Boolean);
-  const words = parts.join("; ").replace(/\s+/g, " ");
+  const words = parts.join("; ").replace(/\s+/g, " ").replace(/\u2212(?=\d)/g, "-");
   const safe = /^[=+\-@\t]/.test(words) && !/^[+-]?[\d.]/.test(words) ? `'${words}` : words;
   return QUOTE + safe.split(QUOTE).join(QUOTE + QUOTE) + QUOTE;
 }
@@ -88,17 +88,17 @@ addEventListener("beforeprint", () => {
 });
 addEventListener("afterprint", () => { for (const part of unfolded) part.open = false; });
 
-/* No number is broken from its thousands or its unit at the end of a line. */
-function unbroken() {
+/* Numbers have a minus, and none is broken from its thousands or its unit at the end of a line. */
+function typeset() {
   const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   while (walk.nextNode()) {
-    const node = walk.currentNode, words = node.data.replace(/(\d) (?=\d{3}(?!\d)|%|(?:[kM]?Wh|k?[JW]|min|h|s|mm|m|kg|EUR|deg)(?!\w))/g, "$1\u00a0");
-    if (words !== node.data && !node.parentElement.closest("script, style")) node.data = words;
+    const node = walk.currentNode, words = node.data.replace(/(^|[\s(])-(?=\d)/g, "$1\u2212").replace(/(\d) (?=\d{3}(?!\d)|%|(?:[kM]?Wh|k?[JW]|min|h|s|mm|m|kg|EUR|deg)(?!\w))/g, "$1\u00a0");
+    if (words !== node.data && !node.parentElement.closest("script, style, code, pre")) node.data = words;
   }
 }
 
 function exportButtons() {
-  unbroken();
+  typeset();
   const button = (label, name, act) => {
     const element = document.createElement("button");
     element.type = "button";

@@ -1,0 +1,65 @@
+"""What pages have in common: their head with title, badges and the button for light and dark, and
+the answer that stands above all figures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ir_recorder.report.number_text import text
+from ir_recorder.report.page import asset
+
+_PLAIN = "themes(() => {}, () => {});\nexportButtons();"
+SCRIPTS = ("charts.js", "export.js")
+"""Of a page without curves."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a page says first: the result in a few large words and a sentence, how sure it is, and
+    what to do; "" where there is nothing to say.
+    """
+
+    result: str
+    words: str
+    sure: str = ""
+    do: str = ""
+
+    def html(self) -> str:
+        """As the first section of a page."""
+        parts = [f"<div><h2>Result</h2><b>{text(self.result)}</b><p>{text(self.words)}</p></div>"]
+        for head, words in (("How sure", self.sure), ("What to do", self.do)):
+            if words:
+                parts.append(f"<div><h2>{head}</h2><p>{text(words)}</p></div>")
+        return f'<section id="answer">{"".join(parts)}</section>\n'
+
+
+def badge(words: str, kind: str) -> str:
+    """A verdict beside the title. kind: good, bad or open."""
+    return f'<p class="verdict {kind}">{text(words)}</p>'
+
+
+def shell(
+    title: str,
+    subtitle: str,
+    main: str,
+    *,
+    badges: Sequence[str] = (),
+    style: str = "",
+    script: str = "",
+) -> str:
+    """A page as text. main, badges: HTML; style: of this page alone; script: the page's own, which
+    answers its button, else it has tables and drawings only.
+    """
+    own = script or "\n".join([*map(asset, SCRIPTS), _PLAIN])
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{text(title)}</title>\n<style>{asset('page.css')}\n{style}</style>\n</head>\n"
+        f"<body>\n<header>\n<div><h1>{text(title)}</h1>"
+        f'<p class="subtitle">{text(subtitle)}</p></div>\n'
+        f'<div class="badges">{"".join(badges)}</div>\n'
+        '<button id="theme" type="button" title="light or dark" aria-label="light or dark">\u25d0'
+        f"</button>\n</header>\n<main>\n{main}\n</main>\n<script>{own}</script>\n</body>\n</html>\n"
+    )
