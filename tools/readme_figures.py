@@ -27,7 +27,8 @@ END = "\n\n"
 def compared() -> BeforeAfter:
     """The demonstration's program against PTP at 100 %."""
     planner = Planner("demo", clock=lambda: 0.0)
-    return before_after_common(planner, (), planner.cell.park)
+    start = planner.cell.posture(planner.cell.cycle_start())
+    return before_after_common(planner, (), start)
 
 
 def figures(found: BeforeAfter, costs: Costs) -> str:

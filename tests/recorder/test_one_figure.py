@@ -16,7 +16,7 @@ from ir_recorder.analysis.loads import carried
 from ir_recorder.analysis.predicted_power import (
     BRAKES,
     MOTORS,
-    left_alone_joules,
+    BrakeTimer,
     pause_joules,
     recorded_power_data,
     resting_watts,
@@ -94,7 +94,7 @@ def test_full_pauses_save_within_the_interval_of_drawn_robots(found: Analysis) -
     cell = found.cell
     data, _ = recorded_power_data(found.recording, found.cell)
     parameters = data_sheet_of(cell.robot, data)
-    timer = data.motors_to_brakes_in_program
+    timer = BrakeTimer.of(data)
     joints = found.recording.joints
     assert joints is not None
 
@@ -111,7 +111,7 @@ def test_full_pauses_save_within_the_interval_of_drawn_robots(found: Analysis) -
             resting_watts(mode, q, there, loads, own.power_with(data))
             for mode in (MOTORS, BRAKES, step.movement.power_mode)
         ]
-        alone = left_alone_joules(powers[0], powers[1], length, timer, changed(BRAKES))
+        alone = timer.joules(powers[0], powers[1], length)
         mode = step.movement.power_mode
         if mode == MOTORS or length < changed(mode):
             return 0.0
@@ -132,7 +132,7 @@ def test_savings_are_of_the_cycle_that_is_counted(found: Analysis) -> None:
         pytest.skip("the recording carries no savings")
     total = cycle.savings.total
     full = found.program.unshortened if found.program is not None else None
-    added = sum(pause.seconds for pause in full.added) if full is not None else 0.0
+    added = sum(pause.planned_seconds for pause in full.added) if full is not None else 0.0
     assert total.seconds == pytest.approx(found.savings.total.seconds + added)
     if found.savings.total.saved_high > found.savings.total.saved_low:
         assert total.saved_low <= total.saved <= total.saved_high

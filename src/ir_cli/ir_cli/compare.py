@@ -77,9 +77,8 @@ def add_compare(compare: argparse.ArgumentParser) -> None:
     compare.add_argument(
         "--stations", nargs="+", default=[], metavar="NAME", help="of PTP at 100 %%"
     )
-    compare.add_argument(
-        "--start", default="park", help="of PTP at 100 %%: posture or joint values (park)"
-    )
+    words = "of PTP at 100 %%: posture or joint values (where it ends, as in production; else park)"
+    compare.add_argument("--start", default="", help=words)
     compare.add_argument(
         "--cycle-time",
         type=float,
@@ -156,7 +155,8 @@ def _found(arguments: argparse.Namespace, planner: Planner, line: ProgressLine) 
     if not endings:
         stations: Sequence[str] = arguments.stations
         check_stations(stations, planner)
-        start = configuration_of(arguments.start, planner, arguments.safety_distance)
+        place = arguments.start or planner.cell.cycle_start(stations)
+        start = configuration_of(place, planner, arguments.safety_distance)
         return before_after_common(
             planner, stations, start, arguments.cycle_time, options, line.show
         )

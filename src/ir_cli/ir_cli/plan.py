@@ -77,7 +77,8 @@ def add_plan(plan: argparse.ArgumentParser) -> None:
     )
     words = "of several robots: all together never need more; 0: no limit (0)"
     plan.add_argument("--peak-power", type=float, default=0.0, metavar="KW", help=words)
-    plan.add_argument("--start", default="park", help="posture or joint values (park)")
+    words = "posture or joint values (where the program ends, as in production; else park)"
+    plan.add_argument("--start", default="", help=words)
     plan.add_argument(
         "--saving",
         action="store_true",
@@ -121,7 +122,8 @@ def run_plan(arguments: argparse.Namespace) -> int:
         planner = _planner(arguments)
         stations = tuple(arguments.stations)
         check_stations(stations, planner)
-        start = configuration_of(arguments.start, planner, arguments.safety_distance)
+        place = arguments.start or planner.cell.cycle_start(stations)
+        start = configuration_of(place, planner, arguments.safety_distance)
         options = options_of(arguments)
         plan = planner.plan_program(
             stations=stations,

@@ -86,7 +86,7 @@ def _check(arguments: argparse.Namespace) -> None:
     """Raise InputError for what belongs to one robot."""
     for given, name in (
         (arguments.stations, "--stations"),
-        (arguments.start != "park", "--start"),
+        (arguments.start, "--start"),
         (arguments.parts_per_hour is not None, "--parts-per-hour"),
         (arguments.front, "--front"),
         *((each.suffix != ".png", str(each)) for each in arguments.output),

@@ -140,7 +140,7 @@ def _check(arguments: argparse.Namespace) -> None:
     for given, name in (
         (arguments.stations, "--stations"),
         (arguments.cycle_time, "--cycle-time"),
-        (arguments.start != "park", "--start"),
+        (arguments.start, "--start"),
     ):
         if given:
             raise InputError(f"{name} doesn't belong to --parts-per-hour: the route says it")

@@ -199,7 +199,7 @@ class PlanWorker:
             plan = planner.plan_program(
                 stations=asked.stations,
                 options=options,
-                start=cell.posture("park"),
+                start=cell.posture(cell.cycle_start(asked.stations)),
                 progress=progress,
                 cancelled=old,
             )
@@ -227,7 +227,7 @@ class PlanWorker:
             self._post("progress", self._listener.progress, asked.number, phase, done, total)
 
         options = PlanOptions(planning_time=CEILING)
-        start = cell.posture("park")
+        start = cell.posture(cell.cycle_start(asked.stations))
         found = before_after_common(planner, asked.stations, start, 0.0, options, progress)
         costs = Costs()
         figures = figure_table(found, costs) + change_table(found, cell, costs)

@@ -405,6 +405,13 @@ class Cell:
             raise UnknownNameError("posture", name, ("home", "park"))
         return self.machine_home if name == "home" else self.park
 
+    def cycle_start(self, stations: Sequence[str] = ()) -> str:
+        """The posture in which a visit of `stations`, or the program, begins in production: where
+        it ends, as the next cycle follows; "park" where it ends at a station.
+        """
+        stops = tuple(stations) or tuple(step.target for step in self.program if step.target)
+        return stops[-1] if stops and stops[-1] in POSTURES else "park"
+
     def bodies(self, parts: PartPlaces | None = None) -> tuple[Body, ...]:
         """Return all bodies in the world: the floor, the enabled equipment as it stands, the parts
         that lie.

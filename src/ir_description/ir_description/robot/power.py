@@ -4,6 +4,7 @@ II.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -73,6 +74,13 @@ class DcLink:
     def discharge_rate(self) -> float:
         """Share of the voltage that is lost in a second [1/s] where the drive bus is off."""
         return 0.0 if self.discharge is None else 1.0 / self.discharge
+
+    def recharge(self, seconds: float) -> float:
+        """J that the mains give to charge the capacitors again after so long with the drive bus
+        off, begun at the mains' voltage.
+        """
+        whole = self.capacitance * self.voltage * self.voltage
+        return -whole * math.expm1(-self.discharge_rate * seconds)
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from ir_description import (
 )
 from ir_description.robot import DATA_SHEET, DcLink
 from ir_kernels import KernelError
-from ir_msgs_py.modes import deepest
+from ir_msgs_py.modes import deepest, drive_bus_up
 from ir_msgs_py.names import JOINT_NAMES
 from ir_recorder.analysis.clearance import StepClearance, step_clearances
 from ir_recorder.analysis.indirect import IndirectMeter
@@ -31,8 +31,8 @@ from ir_recorder.analysis.meter import Meter
 from ir_recorder.analysis.predicted_power import (
     BRAKES,
     MOTORS,
+    BrakeTimer,
     Predictor,
-    left_alone_joules,
     pause_joules,
     recorded_link,
     recorded_power_data,
@@ -93,7 +93,8 @@ def unshortened_cycle(
     results: Sequence[StepResult],
     fact: str,
     change: Callable[[str], float],
-    timer: float,
+    recharge: Callable[[float], float],
+    timer: BrakeTimer,
     watts: Watts,
     added_watts: Added,
     meter: Meter,
@@ -102,8 +103,8 @@ def unshortened_cycle(
     shorter.
 
     fact: full lengths of the pauses in a power mode, in their order ("180 s, 1800 s"). change:
-    seconds into a mode and back by the data. timer: seconds after which the controller closes the
-    brakes by itself.
+    seconds into a mode and back by the data. recharge: J of the DC link after so long with the
+    drive bus off. timer: the controller left alone.
     """
     lengths = [float(number) for number in re.findall(r"\d+(?:\.\d+)?(?=\s*s\b)", fact)]
     if not lengths:
@@ -117,7 +118,7 @@ def unshortened_cycle(
     if len(pauses) != len(lengths):
         return Unshortened(NAN, NAN, run_pauses, sum(lengths))
     added = tuple(
-        _full_pause(place, result, length, change, timer, watts, added_watts)
+        _full_pause(place, result, length, change, recharge, timer, watts, added_watts)
         for (place, result), length in zip(pauses, lengths, strict=True)
     )
     start = results[0].step.start
@@ -136,41 +137,40 @@ def _full_pause(
     result: StepResult,
     length: float,
     change: Callable[[str], float],
-    timer: float,
+    recharge: Callable[[float], float],
+    timer: BrakeTimer,
     watts: Watts,
     added_watts: Added,
 ) -> FullPause:
     """What `length` [s] adds to a pause of the run, and to that of the common program."""
     sequence = result.step.movement.power_mode
-    planned = result.step.movement.report.energy
+    planned = result.step.movement
     mode = deepest(sequence)
     motors = watts(MOTORS, result)
     brakes = watts(BRAKES, result)
     motors_added = added_watts(MOTORS, result)
     longer = length - result.seconds
-
-    def left_alone(seconds: float) -> float:
-        return left_alone_joules(motors, brakes, seconds, timer, change(BRAKES))
-
-    common_added = left_alone_joules(
-        motors_added, added_watts(BRAKES, result), length, timer, change(BRAKES)
-    )
-    common = left_alone(length) - left_alone(result.seconds)
+    alone = timer.joules(motors, brakes, length)
+    common_added = timer.joules(motors_added, added_watts(BRAKES, result), length)
+    common = alone - timer.joules(motors, brakes, planned.duration)
     if mode == MOTORS or length < change(mode):
-        mode = BRAKES if length > timer + change(BRAKES) else MOTORS
-        full = left_alone(length)
+        mode = BRAKES if length > timer.after else MOTORS
+        full = alone
         saved_added = np.zeros_like(motors_added)
     else:
         full = pause_joules(watts(mode, result), motors, length, change(mode))
+        full += 0.0 if drive_bus_up(mode) else recharge(length - change(mode))
         own = pause_joules(added_watts(mode, result), motors_added, length, change(mode))
         saved_added = common_added - own
     energy = full - result.energy
-    predicted = full - planned
+    predicted = full - planned.report.energy
     if deepest(sequence) != sequence and longer >= 0.0:
         # one mode after the other: the last one lasts longer
         energy = longer * watts(mode, result)
-        predicted = energy
-    return FullPause(place, mode, longer, energy, predicted, common, saved_added)
+        predicted = (length - planned.duration) * watts(mode, result)
+    return FullPause(
+        place, mode, longer, length - planned.duration, energy, predicted, common, saved_added
+    )
 
 
 def _measured(name: str, results: Sequence[StepResult]) -> Share:
@@ -336,8 +336,9 @@ class _Analyser:
             name = self.data.resting(mode).name
             return predictor.added_at_rest(name, q, carried(cell, result.step.movement.load))
 
-        timer = self.data.motors_to_brakes_in_program
-        return unshortened_cycle(results, fact, change, timer, watts, added, meter)
+        timer = BrakeTimer.of(self.data)
+        recharge = self.data.dc_link.recharge
+        return unshortened_cycle(results, fact, change, recharge, timer, watts, added, meter)
 
     def _posture(self, step: ExecutedStep, cell: Cell | None) -> FloatArray | None:
         """Joint values (n,) where a step begins; None where posture or cell are missing."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -100,16 +100,38 @@ def resting_watts(
 Power = TypeVar("Power", float, FloatArray)
 
 
-def left_alone_joules(
-    motors: Power, brakes: Power, seconds: float, timer: float, change: float
-) -> Power:
-    """J of a pause on motors: after `timer` [s] the controller closes the brakes by itself.
-
-    motors, brakes [W]: at rest in the two modes; change [s]: closing and opening, at `motors`.
+@dataclass(frozen=True)
+class BrakeTimer:
+    """The controller left alone: `after` [s] on motors it closes the brakes by itself, and opens
+    them when the pause ends; closing, opening [s] at the power of motors, at least `stay` [s]
+    between.
     """
-    if seconds <= timer + change:
-        return motors * seconds
-    return motors * (timer + change) + brakes * (seconds - timer - change)
+
+    after: float
+    closing: float
+    opening: float
+    stay: float
+
+    @classmethod
+    def of(cls, data: PowerData) -> BrakeTimer:
+        """That of the data of a controller."""
+        own = data.resting(BRAKES)
+        return cls(
+            data.motors_to_brakes_in_program,
+            own.time_to_pause,
+            own.regular_time_to_operate,
+            own.minimum_stay,
+        )
+
+    def joules(self, motors: Power, brakes: Power, seconds: float) -> Power:
+        """J from the start of a pause until the robot is ready after it; motors, brakes [W]: at
+        rest in the two modes.
+        """
+        if seconds <= self.after:
+            return motors * seconds
+        closed = self.after + self.closing
+        awake = max(seconds, closed + self.stay)
+        return motors * (closed + self.opening) + brakes * (awake - closed)
 
 
 def pause_joules(watts: Power, motors: Power, seconds: float, change: float) -> Power:

@@ -306,7 +306,7 @@ def _full_savings(
     pauses = Saving(
         rested.common + sum(pause.common_energy for pause in full.added),
         rested.planned + sum(pause.predicted_energy for pause in full.added),
-        rested.seconds + sum(pause.seconds for pause in full.added),
+        rested.seconds + sum(pause.planned_seconds for pause in full.added),
     )
     added = np.sum([pause.saved_added for pause in full.added], axis=0)
     low, high = interval_over(pauses.saved, np.asarray(added))

@@ -164,15 +164,17 @@ class StationUse:
 class FullPause:
     """What the full length of a shortened pause adds to the run, computed.
 
-    step: its place among the results; mode: where the time is spent. energy [J]: beyond what was
-    measured; predicted_energy [J]: beyond what was planned; common_energy [J]: the same for the
-    common program, whose controller closes the brakes by its own timer. saved_added (N,) J: what
-    drawn robots add to what is saved in the whole pause at its full length.
+    step: its place among the results; mode: where the time is spent. seconds [s], energy [J]:
+    beyond what was measured; planned_seconds, predicted_energy: beyond what was planned;
+    common_energy [J]: the same for the common program, whose controller closes the brakes by its
+    own timer. saved_added (N,) J: what drawn robots add to what is saved in the whole pause at its
+    full length.
     """
 
     step: int
     mode: str
     seconds: float
+    planned_seconds: float
     energy: float
     predicted_energy: float
     common_energy: float

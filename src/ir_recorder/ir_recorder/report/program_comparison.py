@@ -284,6 +284,8 @@ def _keyed(side: Side) -> Sequence[tuple[tuple[str, int], str]]:
     times: dict[str, int] = {}
     found = []
     for hop in side.hops:
+        if hop.seconds <= 0.0:  # it is where it has to go
+            continue
         times[hop.name] = times.get(hop.name, 0) + 1
         mode = hop.power_mode.replace(">", ", ").replace("_", " ").lower()
         between = span_of(hop.energy_low, hop.energy_high, joules)
