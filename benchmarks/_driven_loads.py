@@ -10,14 +10,9 @@ import numpy as np
 
 from ir_description import Cell
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver import (
-    LoadCheckSettings,
-    LoadFinding,
-    Simulation,
-    SimulationSettings,
-    make_simulation,
-)
+from ir_sim_driver import Simulation, SimulationSettings, make_simulation
 from ir_sim_driver.errors import TrajectoryRefusedError
+from ir_sim_driver.load_check import LoadCheckSettings, LoadFinding
 from ir_sim_driver.motion import TrajectoryGoal
 from ir_sim_driver.plant import Carried
 from ir_values.arrays import FloatArray

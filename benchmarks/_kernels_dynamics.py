@@ -18,16 +18,10 @@ from _pinocchio_arm import pinocchio_arm
 from _results import Claim, at_least, at_most
 
 from ir_description import load_robot
-from ir_kernels import (
-    CcdSettings,
-    Chain,
-    DcBusParameters,
-    DynamicsModel,
-    SphericalWristIk,
-    ccd,
-    dc_bus,
-    motion_extrema,
-)
+from ir_kernels import CcdSettings, Chain, DynamicsModel, ccd, dc_bus
+from ir_kernels.limits import motion_extrema
+from ir_kernels.power import DcBusParameters
+from ir_kernels.spherical_wrist import SphericalWristIk
 from ir_values.arrays import FloatArray
 
 SAMPLES = 4096

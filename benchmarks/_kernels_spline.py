@@ -7,7 +7,8 @@ from _kernels_geometry import model_of
 from _kernels_rows import Row, Tool, best
 
 from ir_description import load_cell
-from ir_kernels import DynamicsModel, SplineCost, SplineDescent, SplineTerms
+from ir_kernels import DynamicsModel, SplineCost, SplineDescent
+from ir_kernels.spline_terms import SplineTerms
 
 # control points: 70 samples
 CONTROL = 38

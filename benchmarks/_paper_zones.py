@@ -11,7 +11,8 @@ import numpy as np
 from _paper_peers import Question
 from _regional_tasks import scene_of_cell
 
-from ir_description import Body, Cell, Equipment, Zone, load_cell
+from ir_description import Body, Cell, Equipment, load_cell
+from ir_description.cell import Zone
 from ir_description.cell.equipment import ZoneKind
 from ir_description.poses import pose_of
 from ir_values.arrays import FloatArray

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ir_description import AllowedContact, Body, Cell, Equipment, Zone, load_cell
-from ir_description.cell import station_at
+from ir_description import Body, Cell, Equipment, load_cell
+from ir_description.cell import AllowedContact, Zone, station_at
 from ir_description.poses import pose_of
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_values.arrays import FloatArray

@@ -13,16 +13,8 @@ from typing import Any
 import numpy as np
 from _results import Claim, at_least, at_most
 
-from ir_krl import (
-    Followed,
-    KrlError,
-    WrittenPause,
-    WrittenSignals,
-    WrittenSpline,
-    follow,
-    parse,
-    written,
-)
+from ir_krl import Followed, KrlError, follow, parse
+from ir_krl.write import WrittenPause, WrittenSignals, WrittenSpline, written
 from ir_planner import Planner
 from ir_planner.krl import follow_krl, tool_in_flange
 from ir_planner.krl.execution import DrivenStep, drive

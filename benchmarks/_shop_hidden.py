@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from _results import Claim, at_least, at_most
 
-from ir_krl import Effect, KrlError, Motion, SetOutput, StandStill, follow, parse
+from ir_krl import KrlError, Motion, follow, parse
+from ir_krl.run import Effect, SetOutput, StandStill
 from ir_values.arrays import FloatArray
 
 PROGRAMS = 300

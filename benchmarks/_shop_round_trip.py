@@ -12,7 +12,8 @@ from _results import Claim, at_least, at_most
 from _shop_cells import drawn_cell
 
 from ir_description import bundled_cells
-from ir_krl import STYLES, follow, parse, plc_input, read_plc_table
+from ir_krl import follow, parse
+from ir_krl.write import STYLES, plc_input, read_plc_table
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_planner import Planner, ProgramPlan, RequestError
 from ir_planner.krl import EvaluatedStep, KrlExport, evaluate_krl, export_krl, tool_in_flange

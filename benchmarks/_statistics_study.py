@@ -19,11 +19,12 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from ir_recorder.analysis.intervals import alike, mean_of
-from ir_studies import Means, study_of
+from ir_studies import Means
 from ir_studies.statistics import EXAMPLE, StatisticsSettings, run_statistics
 from ir_studies.statistics.findings import Comparison
 from ir_studies.statistics.runs import FinishedStatistics
 from ir_studies.statistics.settings import DRAWN
+from ir_studies.studies import study_of
 from ir_studies.work.results import NAME
 from ir_values.arrays import FloatArray
 

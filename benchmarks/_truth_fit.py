@@ -23,14 +23,8 @@ from _truth_section import Asked, Found
 
 from ir_cli.excitation_programme import ExcitationRequest as Excitation
 from ir_cli.excitation_programme import Programme, plan_programme
-from ir_description import (
-    Cell,
-    Load,
-    PowerParameters,
-    data_sheet,
-    interval_over,
-    load_power_data,
-)
+from ir_description import Cell, Load, PowerParameters, data_sheet, load_power_data
+from ir_description.robot import interval_over
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Goal, Planner, PlannerSettings

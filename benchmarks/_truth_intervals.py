@@ -16,7 +16,8 @@ from _results import at_least, at_most
 from _tracked_run import TrackedRun
 from _truth_section import Asked, Found
 
-from ir_description import load_power_data, load_power_parameters
+from ir_description import load_power_data
+from ir_description.library import load_power_parameters
 from ir_planner.checks import JouleInterval, interval, movement_spread
 from ir_planner.scene import scene_with
 from ir_sim_driver.plant import typical_plant

@@ -19,15 +19,8 @@ from _over_seeds import over_seeds
 from _results import Claim, at_least, at_most
 from _truth_section import Asked, Found
 
-from ir_description import (
-    Cell,
-    Load,
-    PowerParameters,
-    data_sheet,
-    load_cell,
-    load_power_data,
-    robot_marks,
-)
+from ir_description import Cell, Load, PowerParameters, data_sheet, load_cell, load_power_data
+from ir_description.library import robot_marks
 from ir_kernels.dynamics import DynamicsModel
 from ir_sim_driver.load_check import Declared, LoadFinding, NotedMotion, Uncertainty, weighed
 from ir_sim_driver.plant import Carried, Plant, nominal_plant, typical_plant

@@ -15,7 +15,8 @@ from _cell_movements import CellMovement, movements_of, planner_in
 from _results import Claim, at_most
 from _truth_section import Asked, Found
 
-from ir_description import PowerParameters, load_power_data, load_power_parameters
+from ir_description import PowerParameters, load_power_data
+from ir_description.library import load_power_parameters
 from ir_planner import PlannerSettings
 from ir_planner.scene import Drives, scene_with, torque_use
 from ir_values.arrays import FloatArray

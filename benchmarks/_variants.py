@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 from _regional_tasks import scene_of_cell
 
-from ir_description import Cell, Equipment, Station, Task, cell_to_yaml, load_cell
+from ir_description import Cell, Equipment, Station, cell_to_yaml, load_cell
+from ir_description.cell import Task
 from ir_description.poses import composed
 from ir_values.arrays import FloatArray
 

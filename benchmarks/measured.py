@@ -25,15 +25,8 @@ from _results import Claim, at_least, at_most, command_line, finish, line_of
 from _truth_section import Asked
 from scipy.stats import binomtest
 
-from ir_description import (
-    Load,
-    PowerParameters,
-    RobotModel,
-    centre_deviations,
-    data_sheet_of,
-    interval_over,
-    load_robot,
-)
+from ir_description import Load, PowerParameters, RobotModel, data_sheet_of, load_robot
+from ir_description.robot import centre_deviations, interval_over
 from ir_recorder.errors import RecorderError
 from ir_recorder.fit import (
     Estimate,

@@ -29,9 +29,12 @@ from _results import Claim, at_least, at_most, command_line, finish, line_of
 from _second_opinion import SecondOpinion
 
 from ir_cli.main import main as ir
-from ir_description import Cell, RobotModel, load_cell, load_robot, robot_named, robot_urdf
+from ir_description import Cell, RobotModel, load_cell, load_robot, robot_urdf
 from ir_description.files.making import TEMPLATE
-from ir_kernels import Chain, InverseKinematics, SphericalWristIk, inverse_kinematics
+from ir_description.library import robot_named
+from ir_kernels import Chain, inverse_kinematics
+from ir_kernels.ik_set import InverseKinematics
+from ir_kernels.spherical_wrist import SphericalWristIk
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Goal, Planner, parse_goal
 from ir_values.arrays import FloatArray

@@ -28,7 +28,8 @@ from _shop_round_trip import DRAWN, QUICK_DRAWN, STOPPED, round_trips
 from _shop_traces import traces
 
 from ir_description import bundled_cells, load_cell
-from ir_krl import follow, parse, plc_input
+from ir_krl import follow, parse
+from ir_krl.write import plc_input
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner, ProgramPlan, RequestError
 from ir_planner.krl import KrlExport, evaluate_krl, export_krl, tool_in_flange

@@ -16,7 +16,9 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from ir_krl import Effect, File, KrlError, Project, read_project
+from ir_krl import KrlError, read_project
+from ir_krl.project import File, Project
+from ir_krl.run import Effect
 from ir_planner import Planner
 from ir_planner.krl import evaluate_krl, follow_krl
 

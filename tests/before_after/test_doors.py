@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from ir_cli.trace_programs import RecordedDoors
-from ir_description import ProgramStep, Signal, load_cell
+from ir_description import ProgramStep, load_cell
 from ir_msgs_py.names import NO_LOAD
+from ir_msgs_py.plc import Signal
 from ir_planner import Planner, PlanOptions, parse_goal
 from ir_planner.before_after import Today, TodayMotion
 from ir_planner.before_after.today_steps import (

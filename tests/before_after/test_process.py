@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ir_cli.main import main
-from ir_description import CellPath
+from ir_description.cell import CellPath
 from ir_krl import follow, parse
 from ir_msgs_py.report import MovementKind
 from ir_msgs_py.savings import BeforeAfter, Side

@@ -9,7 +9,7 @@ from _shop_cells import drawn_cell
 from _shop_hidden import row_of
 from _shop_round_trip import SHARE, planned, round_trip
 
-from ir_krl import STYLES
+from ir_krl.write import STYLES
 from ir_planner import Planner
 
 

@@ -8,7 +8,8 @@ import pytest
 
 from ir_cli.main import main
 from ir_cli.output import kilowatt_hours
-from ir_description import bundled_cells, bundled_robot_cells, cell_to_yaml, load_cell
+from ir_description import bundled_cells, cell_to_yaml, load_cell
+from ir_description.library import bundled_robot_cells
 
 
 @pytest.mark.parametrize("name", bundled_cells())

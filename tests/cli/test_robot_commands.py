@@ -18,7 +18,8 @@ from ir_cli.robot_from_urdf import RobotSource
 from ir_cli.robot_remarks import remarks_on
 from ir_cli.robot_shapes import Shapes, capsules_of
 from ir_cli.self_pairs import Pairs, kept_sentences
-from ir_description import load_cell, load_robot, robot_named, robot_urdf
+from ir_description import load_cell, load_robot, robot_urdf
+from ir_description.library import robot_named
 from ir_description.robot import ReducedDistance
 from ir_kernels import Chain, DynamicsModel
 

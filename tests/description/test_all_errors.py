@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_description import CellFileError, bundled_cells, cell_file_errors, load_cell
+from ir_description import CellFileError, bundled_cells, load_cell
+from ir_description.library import cell_file_errors
 
 DEMO = (files("ir_description") / "data" / "cells" / "demo.yaml").read_text(encoding="utf-8")
 # what is written, what is typed instead, and a word of the sentence it gets

@@ -14,13 +14,12 @@ from ir_description import (
     Load,
     ProgramStep,
     UnknownNameError,
-    Zone,
     cell_from_yaml,
     cell_to_yaml,
     check_cell,
     load_cell,
 )
-from ir_description.cell import zone_around
+from ir_description.cell import Zone, zone_around
 from ir_description.poses import composed, inverse, pose_of, rotation_from_abc
 from ir_description.shapes import BodyKind, capsule_distance
 from ir_kernels import Chain, CollisionModel

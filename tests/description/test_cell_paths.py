@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ir_description import CellFileError, cell_from_yaml, cell_hash, cell_to_yaml, path_from_yaml
+from ir_description import CellFileError, cell_from_yaml, cell_hash, cell_to_yaml
+from ir_description.files import path_from_yaml
 from ir_msgs_py.cartesian import CartesianPath
 
 HEAD = "format: ir_cell/1\nname: c\nrobot: kr210_r2700_extra\n"

@@ -20,9 +20,9 @@ from ir_description import (
     cell_from_yaml,
     cell_to_yaml,
     load_cell,
-    read_cell_apart,
 )
 from ir_description import library as cell_process
+from ir_description.library import read_cell_apart
 
 LONG = (
     "# " + "x" * cell_process.CHARACTERS_HERE + "\n"

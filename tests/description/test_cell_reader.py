@@ -15,28 +15,31 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ir_description import (
-    AllowedContact,
     Body,
-    Capsule,
     Cell,
     CellFileError,
-    CellSignal,
     Equipment,
-    EquipmentState,
     Load,
-    Part,
     ProgramStep,
-    Signal,
-    StateSwitch,
     Station,
-    Task,
-    Zone,
     cell_from_yaml,
     cell_to_yaml,
     load_cell,
     load_robot,
 )
-from ir_description.cell import ZONE_KINDS, StationSearch, station_at, zone_around
+from ir_description.cell import (
+    ZONE_KINDS,
+    AllowedContact,
+    CellSignal,
+    EquipmentState,
+    Part,
+    StateSwitch,
+    StationSearch,
+    Task,
+    Zone,
+    station_at,
+    zone_around,
+)
 from ir_description.poses import (
     abc_from_rotation,
     pose_of,
@@ -44,7 +47,8 @@ from ir_description.poses import (
     rotation_from_matrix,
     rotation_from_quaternion,
 )
-from ir_description.shapes import KINDS
+from ir_description.shapes import KINDS, Capsule
+from ir_msgs_py.plc import Signal
 from ir_values.arrays import FloatArray, solid_box_inertia
 
 ROBOT = load_robot()

@@ -13,18 +13,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_description import (
-    CellFileError,
-    RobotFileError,
-    Signal,
-    UnknownNameError,
-    cell_file_errors,
-    cell_from_yaml,
-    cell_to_yaml,
-    load_cell,
-    robot_named,
-)
+from ir_description import CellFileError, UnknownNameError, cell_from_yaml, cell_to_yaml, load_cell
 from ir_description.files import robot_file_errors
+from ir_description.library import cell_file_errors, robot_named
+from ir_msgs_py.plc import Signal
+from ir_values.errors import RobotFileError
 
 GOOD = """\
 format: ir_cell/1

@@ -1,6 +1,6 @@
 """Every figure of the data files has a mark, found by its place."""
 
-from ir_description import power_marks, robot_marks
+from ir_description.library import power_marks, robot_marks
 
 
 def test_every_figure_has_a_mark_under_its_place():

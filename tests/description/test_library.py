@@ -23,7 +23,8 @@ from ir_description import (
     load_power_data,
 )
 from ir_description.poses import composed, pose_of
-from ir_kernels import Chain, CollisionModel, SphericalWristIk
+from ir_kernels import Chain, CollisionModel
+from ir_kernels.spherical_wrist import SphericalWristIk
 from ir_msgs_py.plc import PLC_INPUT_NAMES, PlcOutputs
 from ir_values.arrays import FloatArray
 

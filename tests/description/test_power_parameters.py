@@ -15,14 +15,12 @@ from ir_description import (
     InvalidValueError,
     PowerParameters,
     UnknownNameError,
-    interval_over,
     load_power_data,
-    load_power_parameters,
     load_robot,
-    parameter_unit,
-    physical_bounds,
-    power_parameters_to_yaml,
 )
+from ir_description.files import power_parameters_to_yaml
+from ir_description.library import load_power_parameters
+from ir_description.robot import interval_over, parameter_unit, physical_bounds
 
 
 @pytest.fixture

@@ -11,16 +11,16 @@ import pytest
 
 from ir_description import (
     CellFileError,
-    RobotFileError,
     cell_from_yaml,
     cell_hash,
     cell_to_yaml,
     check_cell,
     load_cell,
     load_robot,
-    robot_file_errors,
-    robot_named,
 )
+from ir_description.files import robot_file_errors
+from ir_description.library import robot_named
+from ir_values.errors import RobotFileError
 
 ROBOTS = files("ir_description") / "data" / "robots"
 TEXT = (ROBOTS / "ur10e.yaml").read_text(encoding="utf-8")

@@ -12,15 +12,13 @@ from ir_description import (
     CellFileError,
     RobotCells,
     UnknownNameError,
-    bundled_robot_cells,
-    cell_file_errors,
     cell_from_yaml,
     cell_hash,
     cell_to_yaml,
     load_cell,
     load_robot_cells,
-    robot_in,
 )
+from ir_description.library import bundled_robot_cells, cell_file_errors, robot_in
 from ir_kernels import Chain
 
 TEXT = (files("ir_description") / "data" / "robot_cells" / "two_robots.yaml").read_text("utf-8")

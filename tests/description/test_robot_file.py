@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 from ir_description import (
-    Counterbalance,
     InvalidValueError,
-    RobotFileError,
     RobotModel,
     UnknownNameError,
     load_cell,
@@ -19,6 +17,8 @@ from ir_description import (
     load_robot,
 )
 from ir_description.files import robot_from_yaml
+from ir_description.robot import Counterbalance
+from ir_values.errors import RobotFileError
 
 GRAVITY = 9.80665
 ROUNDING = 0.05  # W: copper losses are given to four digits

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from ir_description import (
     CellFileError,
-    ProcessTimes,
     ProgramStep,
     cell_from_yaml,
     cell_hash,
@@ -21,6 +20,7 @@ from ir_description import (
     check_cell,
     load_cell,
 )
+from ir_description.cell import ProcessTimes
 
 FLEXIBLE = load_cell("flexible")
 TEXT = cell_to_yaml(FLEXIBLE)

@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from ir_description import Cell, ToolTilt, cell_from_yaml, cell_hash, cell_to_yaml, load_cell
+from ir_description import Cell, cell_from_yaml, cell_hash, cell_to_yaml, load_cell
+from ir_description.cell import ToolTilt
 from ir_values.errors import CellFileError, InvalidValueError
 
 PLACE = "{station: place, dwell: 0.5"

@@ -11,16 +11,8 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 import pytest
 
-from ir_description import (
-    Load,
-    RobotModel,
-    bundled_cells,
-    fixed_frames,
-    load_cell,
-    load_robot,
-    moving_frames,
-    robot_urdf,
-)
+from ir_description import Load, RobotModel, bundled_cells, load_cell, load_robot, robot_urdf
+from ir_description.robot import fixed_frames, moving_frames
 from ir_values.arrays import FloatArray, solid_box_inertia
 
 pybullet = pytest.importorskip("pybullet")

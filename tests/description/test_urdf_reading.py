@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ir_description import InvalidValueError, RobotFileError
+from ir_description import InvalidValueError
 from ir_description.files.collada import triangles_from_collada
 from ir_description.files.making import Meshes, fitted, link_bodies, urdf_arm, with_masses
 from ir_values.arrays import FloatArray
+from ir_values.errors import RobotFileError
 
 AXES = ("0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 1 0", "1 0 0")
 PLACES = ("0 0 0.4", "0.2 0 0", "0 0 0.6", "0.3 0 0.1", "0.3 0 0", "0.1 0 0")

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ir_description import OUTSIDE_MAX
+from ir_description.robot import OUTSIDE_MAX
 from ir_kernels.dynamics import DynamicsModel
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion import ExecutionSettings, PathMotion, check_trajectory, checked_route

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_description import AllowedContact, ProgramStep, Zone, load_cell, machine_in
+from ir_description import ProgramStep, load_cell
+from ir_description.cell import AllowedContact, Zone, machine_in
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver import make_simulation
 from ir_sim_driver.controller.cell_scene import MachinesInScene, Parts

@@ -7,7 +7,8 @@ import pickle
 import pytest
 
 from ir_msgs_py.status import StatusCode
-from ir_sim_driver import DriverError, ErrorCode, RequestRefusedError, TrajectoryRefusedError
+from ir_sim_driver import DriverError, ErrorCode, TrajectoryRefusedError
+from ir_sim_driver.errors import RequestRefusedError
 
 
 @pytest.mark.parametrize(

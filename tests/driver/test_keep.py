@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_description import AllowedContact, load_cell, load_power_data
+from ir_description import load_cell, load_power_data
+from ir_description.cell import AllowedContact
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver import make_simulation

@@ -7,20 +7,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ir_description import data_sheet, load_cell, robot_marks
+from ir_description import data_sheet, load_cell
+from ir_description.library import robot_marks
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver import (
-    ErrorCode,
-    GoalOutcome,
+from ir_sim_driver import ErrorCode, SimulationSettings, TrajectoryGoal, make_simulation
+from ir_sim_driver.controller.outputs import report
+from ir_sim_driver.load_check import (
+    Declared,
     LoadCheckSettings,
     LoadFinding,
-    SimulationSettings,
-    TrajectoryGoal,
-    make_simulation,
+    NotedMotion,
+    Uncertainty,
+    weighed,
 )
-from ir_sim_driver.controller.outputs import report
-from ir_sim_driver.load_check import Declared, NotedMotion, Uncertainty, weighed
+from ir_sim_driver.motion import GoalOutcome
 from ir_sim_driver.notices import Level
 from ir_sim_driver.plant import carried
 from ir_values.arrays import FloatArray

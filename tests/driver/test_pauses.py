@@ -9,7 +9,8 @@ from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import OperatingMode
 from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.errors import RequestRefusedError
-from ir_sim_driver.power import IdleTimes, best_mode, charging_of, energy_of
+from ir_sim_driver.power import IdleTimes, charging_of
+from ir_sim_driver.power.profienergy import best_mode, energy_of
 
 CHARGING = charging_of(load_power_data().dc_link)
 

@@ -12,16 +12,9 @@ from ir_sim_driver.controller.driver import Driver
 from ir_sim_driver.controller.outputs import report
 from ir_sim_driver.controller.simulation import make_simulation
 from ir_sim_driver.errors import SettingsError
-from ir_sim_driver.plant import (
-    nominal_plant,
-    plant_from_yaml,
-    plant_hash,
-    plant_named,
-    plant_to_yaml,
-    typical_plant,
-)
+from ir_sim_driver.plant import nominal_plant, plant_hash, plant_named, plant_to_yaml, typical_plant
 from ir_sim_driver.plant.drivetrain import Gears
-from ir_sim_driver.plant.plants import CUT, SPREAD
+from ir_sim_driver.plant.plants import CUT, SPREAD, plant_from_yaml
 from ir_values.errors import DescriptionFileError
 
 HEAD = "format: ir_sim_driver/plant/1\nname: mine\nrobot: kr210_r2700_extra\n"

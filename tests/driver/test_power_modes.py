@@ -6,7 +6,8 @@ import pytest
 
 from ir_msgs_py.modes import ROW, Mode, TransitionTimes
 from ir_sim_driver.errors import SettingsError
-from ir_sim_driver.power import NO_DEMAND, Demand, IdleTimes, PowerModes
+from ir_sim_driver.power import Demand, IdleTimes, PowerModes
+from ir_sim_driver.power.power_modes import NO_DEMAND
 
 DT = 0.001
 STEP = DT * 1.5  # a demand counts from the next step on

@@ -12,8 +12,9 @@ import pytest
 from ir_msgs_py.plc import magic_packet, send_packet, wakes
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_sim_driver.errors import LinkError
-from ir_sim_driver.plc import Controller, WakeOnLan
+from ir_sim_driver.plc import WakeOnLan
 from ir_sim_driver.plc.modbus import ModbusTcp
+from ir_sim_driver.plc.port import Controller
 from ir_sim_driver.plc.wake_listener import WakeListener
 from ir_values.errors import InvalidValueError
 

@@ -16,15 +16,10 @@ from ir_msgs_py.modes import OFF_THE_NETWORK, Mode, TransitionTimes
 from ir_msgs_py.plc import PlcInputs
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver import (
-    Driver,
-    RequestRefusedError,
-    Simulation,
-    SimulationSettings,
-    TrajectoryGoal,
-    make_simulation,
-)
-from ir_sim_driver.plc import BITS, SERVICE, TOPIC
+from ir_sim_driver import Driver, Simulation, SimulationSettings, TrajectoryGoal, make_simulation
+from ir_sim_driver.errors import RequestRefusedError
+from ir_sim_driver.plc import SERVICE, TOPIC
+from ir_sim_driver.plc.inputs import BITS
 from ir_sim_driver.plc.modbus import COILS, MODBUS, ControllerTables, ModbusTcp, answered
 
 QUICK = TransitionTimes(

@@ -29,13 +29,13 @@ from ir_sim_driver import (
     ExecutionSettings,
     SimulationSettings,
     TrajectoryGoal,
-    custom_load,
     make_simulation,
 )
 from ir_sim_driver.controller import ControllerSettings
 from ir_sim_driver.node.messages import goal_from_action
-from ir_sim_driver.plant import carried
-from ir_sim_driver.plc import BITS, SERVICE, TOPIC
+from ir_sim_driver.plant import carried, custom_load
+from ir_sim_driver.plc import SERVICE, TOPIC
+from ir_sim_driver.plc.inputs import BITS
 from ir_sim_driver.plc.modbus import COILS, MODBUS, ControllerTables, answered
 
 PERIOD = 1_000_000  # ns, between two joint states of this driver: every step is judged

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from ir_description import Cell, load_cell
-from ir_sim_driver import RequestRefusedError, custom_load, make_simulation
+from ir_sim_driver import make_simulation
+from ir_sim_driver.errors import RequestRefusedError
+from ir_sim_driver.plant import custom_load
 
 MILLIMETRE = 0.001
 

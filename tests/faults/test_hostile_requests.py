@@ -23,7 +23,7 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from ir_description import read_cell_apart
+from ir_description.library import read_cell_apart
 from ir_msgs import srv
 from ir_msgs.msg import PlanOptions, Status
 from ir_msgs_py.names import JOINT_NAMES

@@ -9,14 +9,9 @@ import pytest
 
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_sim_driver import (
-    Driver,
-    ErrorCode,
-    GoalOutcome,
-    RequestRefusedError,
-    TrajectoryGoal,
-    make_simulation,
-)
+from ir_sim_driver import Driver, ErrorCode, TrajectoryGoal, make_simulation
+from ir_sim_driver.errors import RequestRefusedError
+from ir_sim_driver.motion import GoalOutcome
 from ir_sim_driver.notices import Level
 from ir_sim_driver.plc import SERVICE
 

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ir_kernels import DynamicsModel, Gradients
+from ir_kernels import DynamicsModel
+from ir_kernels.dynamics import Gradients
 from ir_values.arrays import FloatArray
 
 

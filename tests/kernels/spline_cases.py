@@ -8,7 +8,8 @@ from geometry_cases import CAPSULES, COLUMNS, KR210, SELF_PAIRS, TCP, Body, Caps
 from robots import RobotLiteral, coupled, kr210, random_chain, tool_155
 from scipy.interpolate import BSpline
 
-from ir_kernels import Chain, CollisionModel, DynamicsModel, SplineCost, SplineTerms
+from ir_kernels import Chain, CollisionModel, DynamicsModel, SplineCost
+from ir_kernels.spline_terms import SplineTerms
 from ir_values.arrays import FloatArray
 
 FEW = ("l3b", "l6", "t_bar", "t_part")  # capsules that a quick scene has

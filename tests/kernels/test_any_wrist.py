@@ -8,15 +8,10 @@ import numpy as np
 import pytest
 from robots import kr210, random_rotation
 
-from ir_kernels import (
-    Chain,
-    InputError,
-    InverseKinematics,
-    SearchedIk,
-    SphericalWristIk,
-    ThreeParallelIk,
-    inverse_kinematics,
-)
+from ir_kernels import Chain, InputError, inverse_kinematics
+from ir_kernels.ik_set import InverseKinematics
+from ir_kernels.inverse_kinematics import SearchedIk, ThreeParallelIk
+from ir_kernels.spherical_wrist import SphericalWristIk
 from ir_values.arrays import FloatArray
 
 EXACT = 1e-8  # m and entries of rotations

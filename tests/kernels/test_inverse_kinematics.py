@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from robots import RobotLiteral, kr210, random_rotation
 
-from ir_kernels import Chain, InputError, SphericalWristIk
+from ir_kernels import Chain, InputError
+from ir_kernels.spherical_wrist import SphericalWristIk
 from ir_values.arrays import FloatArray
 
 EXACT = 1e-9  # m and entries of rotations

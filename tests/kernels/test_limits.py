@@ -8,8 +8,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from robots import kr210, tool_155
 
-from ir_kernels import DynamicsModel, InputError, motion_extrema, polynomial_extrema
+from ir_kernels import DynamicsModel, InputError
 from ir_kernels.dynamics import EXCEEDS, UNDECIDED, WITHIN
+from ir_kernels.limits import motion_extrema, polynomial_extrema
 from ir_kernels.reference.interval import Dual, interval, power, sine_cosine
 from ir_kernels.reference.limits import derivative, evaluate
 from ir_values.arrays import FloatArray

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from robots import kr210, tool_155
 
-from ir_kernels import DcBusParameters, DynamicsModel, InputError, dc_bus, drive_energy
-from ir_kernels.power import REGENERATIONS, Regeneration
+from ir_kernels import DynamicsModel, InputError, dc_bus
+from ir_kernels.power import REGENERATIONS, DcBusParameters, Regeneration, drive_energy
 
 CAPACITY = 106.0  # J, of the KR C4's capacitors between rest voltage and brake chopper
 POWERS = st.lists(st.lists(st.floats(-5e3, 5e3), min_size=2, max_size=2), min_size=1, max_size=30)

@@ -21,16 +21,9 @@ from spline_cases import (
     terms,
 )
 
-from ir_kernels import (
-    CollisionModel,
-    DcBusParameters,
-    DynamicsModel,
-    SplineCost,
-    SplineTerms,
-    compiled,
-    drive_energy,
-)
-from ir_kernels.power import REGENERATIONS, Regeneration
+from ir_kernels import CollisionModel, DynamicsModel, SplineCost, compiled
+from ir_kernels.power import REGENERATIONS, DcBusParameters, Regeneration, drive_energy
+from ir_kernels.spline_terms import SplineTerms
 from ir_values.arrays import FloatArray, IntArray
 
 FREE: dict[str, Any] = {

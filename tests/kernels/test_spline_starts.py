@@ -9,8 +9,9 @@ import pytest
 from scipy.interpolate import make_interp_spline
 from spline_cases import WORKING, kr210_cost
 
-from ir_kernels import CubicPath, InputError, SplineStarts, polynomial_samples
-from ir_kernels.spline import SplineCost
+from ir_kernels import InputError
+from ir_kernels.limits import polynomial_samples
+from ir_kernels.spline import CubicPath, SplineCost, SplineStarts
 from ir_values.arrays import FloatArray
 
 STARTS = SplineStarts(spacing=0.1, slower=1.3, fewest=8, most=12)

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_kernels import InputError, Surface
-from ir_kernels.surfaces import core_of
+from ir_kernels import InputError
+from ir_kernels.surfaces import Surface, core_of
 from ir_values.arrays import FloatArray
 
 coal = pytest.importorskip("coal")

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ir_krl import AdvanceStop, Blend, Followed, Motion, follow, parse
+from ir_krl import Followed, Motion, follow, parse
+from ir_krl.run import AdvanceStop, Blend
 from ir_planner import Planner
 from ir_planner.krl.execution import DrivenStep, drive
 

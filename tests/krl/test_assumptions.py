@@ -10,19 +10,9 @@ import numpy as np
 import pytest
 
 from ir_cli.main import main
-from ir_krl import (
-    Effect,
-    Followed,
-    KrlError,
-    Motion,
-    SetOutput,
-    StandStill,
-    follow,
-    parse,
-    read_project,
-    settings_of,
-    stubs,
-)
+from ir_krl import Followed, KrlError, Motion, follow, parse, read_project
+from ir_krl.run import Effect, SetOutput, StandStill
+from ir_krl.settings import settings_of, stubs
 from ir_planner import Planner
 from ir_planner.krl import follow_krl
 

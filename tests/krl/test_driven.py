@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_description.poses import abc_from_rotation, rotation_from_abc
-from ir_krl import Followed, KrlMotionError, SourcePlace, Target, follow, parse
+from ir_krl import Followed, KrlMotionError, SourcePlace, follow, parse
+from ir_krl.run import Target
 from ir_planner import Planner
 from ir_planner.krl import evaluate_krl, tool_in_flange
 from ir_planner.krl.execution import drive

@@ -11,29 +11,25 @@ import numpy as np
 import pytest
 
 from ir_cli.main import main
-from ir_description import CellPath
+from ir_description.cell import CellPath
 from ir_description.poses import rotation_from_abc
-from ir_krl import (
+from ir_krl import KrlError, Motion, follow, parse
+from ir_krl.run import Payload, SetOutput
+from ir_krl.settings import settings_of
+from ir_krl.write import (
     Attached,
     FrameNumbers,
-    KrlError,
-    Motion,
-    Payload,
-    SetOutput,
     Style,
     WrittenHandling,
     WrittenMove,
     WrittenSignals,
     base_numbers,
     check_name,
-    follow,
     frame_numbers,
-    parse,
-    settings_of,
     tool_numbers,
     written,
 )
-from ir_krl.write import SignalNames
+from ir_krl.write.names import SignalNames
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_planner import Planner, RequestError

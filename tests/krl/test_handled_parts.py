@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 from ir_description import cell_from_yaml, cell_to_yaml, load_cell
-from ir_krl import Followed, KrlError, Numbers, Payload, follow, parse
-from ir_krl.write import Wiring
+from ir_krl import Followed, KrlError, follow, parse
+from ir_krl.run import Payload
+from ir_krl.write import Numbers
+from ir_krl.write.names import Wiring
 from ir_planner import Planner, RequestError
 from ir_planner.before_after import before_after, today_of_krl
 from ir_planner.checks import evaluate_trajectory

@@ -8,19 +8,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from ir_krl import (
-    Effect,
-    Followed,
-    KrlError,
-    KrlRunError,
-    Motion,
-    SetOutput,
-    SplineBlock,
-    StandStill,
-    WaitForCondition,
-    follow,
-    parse,
-)
+from ir_krl import Followed, KrlError, Motion, follow, parse
+from ir_krl.errors import KrlRunError
+from ir_krl.run import Effect, SetOutput, SplineBlock, StandStill, WaitForCondition
 
 Follow = Callable[..., Followed]
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from ir_krl import KrlError, PlcPause, plc_table, read_plc_table, structured_text
+from ir_krl import KrlError
+from ir_krl.write import PlcPause, plc_table, read_plc_table, structured_text
 from ir_msgs_py.modes import Mode, TransitionTimes
 from ir_msgs_py.plc import OperatingMode
 from ir_planner.program import switch_times

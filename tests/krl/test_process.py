@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_krl import Command, Followed, Motion, SetOutput, SourcePlace, Speeds, StandStill, Target
+from ir_krl import Followed, Motion, SourcePlace
+from ir_krl.run import Command, SetOutput, Speeds, StandStill, Target
 from ir_planner import Planner
 from ir_planner.krl.execution import drive, process_motions
 

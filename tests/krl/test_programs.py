@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ir_krl import KrlError, SetOutput, StandStill
+from ir_krl import KrlError
+from ir_krl.run import SetOutput, StandStill
 from ir_planner import Planner
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))

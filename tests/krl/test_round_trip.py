@@ -11,7 +11,8 @@ import pytest
 
 from ir_description import Cell, ProgramStep, bundled_cells, load_cell
 from ir_description.poses import abc_from_rotation
-from ir_krl import STYLES, follow, parse, plc_input, read_plc_table
+from ir_krl import follow, parse
+from ir_krl.write import STYLES, plc_input, read_plc_table
 from ir_msgs_py.modes import REST_MODES
 from ir_planner import Planner, RequestError
 from ir_planner.before_after import before_after, today_of_krl

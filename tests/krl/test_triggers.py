@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from ir_description import cell_from_yaml, cell_to_yaml, load_cell
-from ir_krl import Followed, KrlError, SetOutput, follow, parse
+from ir_krl import Followed, KrlError, follow, parse
+from ir_krl.run import SetOutput
 from ir_planner import Planner, RequestError
 from ir_planner.before_after.today import today_of_krl
 from ir_planner.krl import evaluate_krl, tool_in_flange

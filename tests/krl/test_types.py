@@ -8,7 +8,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from ir_krl import Effect, Followed, KrlRunError, Motion, StandStill, follow, parse
+from ir_krl import Followed, Motion, follow, parse
+from ir_krl.errors import KrlRunError
+from ir_krl.run import Effect, StandStill
 
 Follow = Callable[..., Followed]
 ROBOT = (np.zeros(6), np.eye(4))  # home and tool

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from ir_cli.main import main
-from ir_krl import Effect, KrlError, Motion, SetOutput, StandStill, WaitForCondition
+from ir_krl import KrlError, Motion
+from ir_krl.run import Effect, SetOutput, StandStill, WaitForCondition
 from ir_krl.urscript import (
     JointLimits,
     follow_urscript,

@@ -161,7 +161,7 @@ def test_a_pose_of_any_link_of_the_hand_is_the_pose_of_the_tcp_there(
 
 def turned_tool0() -> Any:
     """z out of the flange, whose x is out: by the frames that the driver publishes."""
-    from ir_description import fixed_frames
+    from ir_description.robot import fixed_frames
 
     frames = fixed_frames(CELL.robot, (), CELL.tcp, CELL.base_pose)
     return next(each.pose for each in frames if each.name == "tool0")

@@ -20,7 +20,8 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from visualization_msgs.msg import MarkerArray
 
-from ir_krl import parse, read_plc_table
+from ir_krl import parse
+from ir_krl.write import read_plc_table
 from ir_msgs.action import Plan
 from ir_msgs.msg import PlanOptions, ProgramSavings, Status
 from ir_msgs.srv import (

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from sensor_msgs.msg import JointState
 
-from ir_description import Task
+from ir_description.cell import Task
 from ir_msgs.msg import PlanOptions, Status
 from ir_msgs.srv import PlanRegionalMovement
 from ir_msgs_py.options import PlanOptions as Options

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ir_msgs_py.options import PlanOptions
-from ir_planner.regional import MovementPlan, plan_regional
+from ir_planner.regional import MovementPlan
+from ir_planner.regional.regional import plan_regional
 from ir_planner.request import Context, Journal, Work
 from ir_planner.scene import PlanningScene
 from ir_planner.search import SEARCHES, Search

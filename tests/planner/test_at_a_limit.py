@@ -9,10 +9,10 @@ import numpy as np
 import pinocchio
 import pytest
 
-from ir_description import LIMIT_TOLERANCE
+from ir_description.robot import LIMIT_TOLERANCE
 from ir_msgs_py.options import PlanOptions
 from ir_planner import MovementPlan, Planner, Reference, RequestError
-from ir_planner.regional import plan_regional
+from ir_planner.regional.regional import plan_regional
 from ir_planner.request import Context, Work
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # the judge of poses

@@ -11,10 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_description import ProgramStep, Signal, load_cell, load_power_data
+from ir_description import ProgramStep, load_cell, load_power_data
 from ir_msgs_py.announcements import MachineState
 from ir_msgs_py.modes import TransitionTimes
 from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.plc import Signal
 from ir_msgs_py.status import StatusCode
 from ir_planner import Planner
 from ir_planner.current_cell import DriverReports

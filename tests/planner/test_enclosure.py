@@ -11,7 +11,8 @@ from asking import planned
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_description import Body, Cell, Equipment, Zone, cell_from_yaml, load_power_data
+from ir_description import Body, Cell, Equipment, cell_from_yaml, load_power_data
+from ir_description.cell import Zone
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner.checks import FreeSpace

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ir_description import OUTSIDE_MAX
+from ir_description.robot import OUTSIDE_MAX
 from ir_msgs_py.status import StatusCode
 from ir_planner import EscapePlan, Planner, RequestError
 from ir_planner.regional.escape import DEEPER

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from ir_msgs_py.options import PlanOptions
-from ir_planner.optimize import Refinement, estimate
+from ir_planner.optimize import Refinement
+from ir_planner.optimize.portfolio import estimate
 from ir_planner.optimize.refinement import THOROUGH
 from ir_planner.request import Context, Work
 from ir_planner.scene.planning_scene import PlanningScene

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_description import PowerParameters, load_power_data, load_power_parameters
+from ir_description import PowerParameters, load_power_data
+from ir_description.library import load_power_parameters
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner, PlannerSettings

@@ -9,7 +9,8 @@ from typing import cast
 import numpy as np
 import pytest
 
-from ir_description import ROBOTS, Cell, PowerData
+from ir_description import Cell, PowerData
+from ir_description.robot import ROBOTS
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_planner import Planner

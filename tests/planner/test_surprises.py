@@ -12,7 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_description import Cell, ProcessTimes, load_cell
+from ir_description import Cell, load_cell
+from ir_description.cell import ProcessTimes
 from ir_planner import Planner, RequestError, SteadyPlan
 from ir_planner.flexible import counted_times, outage_replay, with_counted_times
 from ir_planner.flexible.surprises import BY_ITSELF, KNOWN, POLICIES, TIMEOUTS, Replay

@@ -10,7 +10,8 @@ import numpy as np
 import pinocchio
 import pytest
 
-from ir_description import Cell, ToolLimits, cell_from_yaml, cell_to_yaml, load_cell
+from ir_description import Cell, cell_from_yaml, cell_to_yaml, load_cell
+from ir_description.robot import ToolLimits
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner, RequestError
 

@@ -10,7 +10,8 @@ import numpy as np
 import pinocchio
 import pytest
 
-from ir_description import ProgramStep, StepVia, cell_from_yaml, cell_to_yaml, load_cell
+from ir_description import ProgramStep, cell_from_yaml, cell_to_yaml, load_cell
+from ir_description.cell import StepVia
 from ir_msgs_py.report import MovementKind
 from ir_msgs_py.status import StatusCode
 from ir_planner import Planner, RequestError

@@ -23,7 +23,8 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from ir_description import cell_from_yaml, load_power_data
-from ir_kernels import DcBusParameters, DynamicsModel, dc_bus
+from ir_kernels import DynamicsModel, dc_bus
+from ir_kernels.power import DcBusParameters
 from ir_msgs.msg import (
     ControllerState,
     PlannedMovement,

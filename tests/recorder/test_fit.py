@@ -16,14 +16,9 @@ import pytest
 from scipy.optimize import least_squares
 
 from ir_cli.main import main
-from ir_description import (
-    PowerParameters,
-    data_sheet,
-    load_cell,
-    load_power_data,
-    load_power_parameters,
-    physical_bounds,
-)
+from ir_description import PowerParameters, data_sheet, load_cell, load_power_data
+from ir_description.library import load_power_parameters
+from ir_description.robot import physical_bounds
 from ir_recorder.errors import RecorderError
 from ir_recorder.fit import DataSource, Fit, fit, fit_data, sentences
 from ir_recorder.fit.data import check_range, check_readings, check_speed

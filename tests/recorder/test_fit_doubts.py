@@ -7,15 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ir_description import (
-    PowerParameters,
-    RobotModel,
-    centre_deviations,
-    data_sheet_of,
-    load_robot,
-    power_parameters_to_yaml,
-)
+from ir_description import PowerParameters, RobotModel, data_sheet_of, load_robot
+from ir_description.files import power_parameters_to_yaml
 from ir_description.library import power_parameters_of
+from ir_description.robot import centre_deviations
 from ir_recorder.errors import RecorderError
 from ir_recorder.fit import Estimate, doubts, fit, recommendation, result
 from ir_recorder.measure import PowerModel, Samples

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ir_description import Cell, cell_in, cell_to_yaml, load_cell
+from ir_description import Cell, cell_to_yaml, load_cell
+from ir_description.cell import cell_in
 from ir_kernels import Chain
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.trajectory import JointTrajectory

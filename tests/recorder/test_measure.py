@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 
 import ir_recorder
 from ir_description import load_cell, load_power_data
-from ir_kernels import DcBusParameters, DynamicsModel, dc_bus
+from ir_kernels import DynamicsModel, dc_bus
+from ir_kernels.power import DcBusParameters
 from ir_recorder.measure.arm import arm_torques
 from ir_recorder.measure.power_model import BusFlow, bus_flow
 from ir_recorder.measure.samples import BANDWIDTH, differentiated, half_width

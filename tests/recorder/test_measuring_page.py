@@ -14,7 +14,8 @@ import yaml
 
 from ir_cli.main import main
 from ir_cli.traces import read_trace
-from ir_description import data_sheet, load_cell, load_power_data, load_power_parameters
+from ir_description import data_sheet, load_cell, load_power_data
+from ir_description.library import load_power_parameters
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder import Analysis, analyse

@@ -10,7 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ir_description import PowerParameters, data_sheet_of, drawn_robots
+from ir_description import PowerParameters, data_sheet_of
+from ir_description.robot import drawn_robots
 from ir_recorder import Analysis, analyse, findings
 from ir_recorder.analysis.loads import carried
 from ir_recorder.analysis.predicted_power import (

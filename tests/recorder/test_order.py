@@ -14,8 +14,7 @@ from sensor_msgs.msg import JointState
 
 from ir_recorder.analysis import analyse
 from ir_recorder.analysis.checks import findings
-from ir_recorder.reading import read_raw
-from ir_recorder.reading.mcap_file import RawChannel, RawRecording
+from ir_recorder.reading.mcap_file import RawChannel, RawRecording, read_raw
 from ir_recorder.reading.reader import read_recording
 from ir_recorder.reading.recording import Recording
 from ir_recorder.traces import read_traces

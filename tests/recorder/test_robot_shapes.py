@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ir_description import Capsule, load_robot
+from ir_description import load_robot
+from ir_description.shapes import Capsule
 from ir_recorder.report.shapes import Mesh, SurfacePart, lathe, robot_parts
 from ir_values.arrays import FloatArray
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ir_description import Body, Capsule
+from ir_description import Body
+from ir_description.shapes import Capsule
 from ir_recorder.report.shapes import body_mesh, capsule_mesh
 
 BODIES = [

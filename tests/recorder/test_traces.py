@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_recorder.errors import RecorderError
-from ir_recorder.traces import clock_offset, mean_power, read_mapping, read_traces, resampled
-from ir_recorder.traces.trace import RATE
+from ir_recorder.traces import clock_offset, mean_power, read_mapping, read_traces
+from ir_recorder.traces.trace import RATE, resampled
 
 JOINTS = ("joint_a1", "joint_a2")
 

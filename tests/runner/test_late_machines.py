@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ir_description import ProcessTimes
+from ir_description.cell import ProcessTimes
 from ir_msgs_py.announcements import Event
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.report import PlannedMovement

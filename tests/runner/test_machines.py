@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ir_description import ProcessTimes, load_cell
+from ir_description import load_cell
+from ir_description.cell import ProcessTimes
 from ir_msgs_py.plc import Signal
 from ir_program_runner.machines import MOST_SIGNALS, Machines, MachineTime
 from ir_values.errors import InvalidValueError

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from ir_studies import Means
-from ir_studies.arena import ArenaSettings, FinishedArena, run_arena
+from ir_studies.arena import ArenaSettings, run_arena
+from ir_studies.arena.runs import FinishedArena
 from ir_studies.work.means import Progress, nobody
 
 sys.path.append(

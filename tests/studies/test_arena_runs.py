@@ -16,8 +16,9 @@ from pyarrow import parquet
 
 from ir_description import cell_to_yaml, load_cell
 from ir_studies import Means
-from ir_studies.arena import ArenaSettings, FinishedArena, read_settings, run_arena
+from ir_studies.arena import ArenaSettings, read_settings, run_arena
 from ir_studies.arena.figures import columns
+from ir_studies.arena.runs import FinishedArena
 from ir_studies.errors import FolderError, WorkerError
 from ir_studies.work.results import NAME
 

@@ -14,9 +14,9 @@ from ir_msgs_py.options import PlanOptions
 from ir_planner import RequestError
 from ir_planner.request import checked_options
 from ir_planner.search.with_ompl import host
-from ir_studies import SettingsError
 from ir_studies.arena import EXAMPLE, PORTFOLIO, ArenaSettings, read_settings
 from ir_studies.arena.settings import entries, tasks_of
+from ir_studies.errors import SettingsError
 
 HEAD = "format: ir_arena/1\n"
 

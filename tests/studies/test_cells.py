@@ -11,9 +11,9 @@ import pytest
 from _cells_drawn import drawn
 from _cells_judge import energy, faults
 
-from ir_studies import SettingsError
 from ir_studies.cells import CellAnswer, Instance, hurried, read_instances, solve_cell, written
 from ir_studies.cells.instance import EnergyCurve, StaticActivity, StopLocation, stay_ranges
+from ir_studies.errors import SettingsError
 
 
 def rows_of(answer: CellAnswer) -> list[tuple[int, int, int, float, float]]:

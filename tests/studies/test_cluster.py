@@ -15,7 +15,8 @@ from typing import Any
 
 import pytest
 
-from ir_studies import LayoutSettings, Means, StoppedError, WorkerError, run_layout
+from ir_studies import LayoutSettings, Means, StoppedError, run_layout
+from ir_studies.errors import WorkerError
 from ir_studies.layout import Layouts
 from ir_studies.work import cluster
 from ir_studies.work.results import NAME

@@ -18,10 +18,11 @@ import numpy as np
 import pytest
 
 from ir_description import cell_to_yaml, load_cell
-from ir_studies import LayoutSettings, Means, read_layout, run_layout
+from ir_studies import LayoutSettings, Means, run_layout
 from ir_studies.errors import FolderError, StoppedError
 from ir_studies.layout import Layouts, search
 from ir_studies.layout.search import points
+from ir_studies.layout.settings import read_layout
 from ir_studies.work.results import NAME
 
 WORKER = Path(__file__).with_name("fake_layout_worker.py")

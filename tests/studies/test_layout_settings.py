@@ -11,8 +11,10 @@ import pytest
 import yaml
 
 from ir_description import cell_to_yaml, load_cell
-from ir_studies import SettingsError, read_layout, study_of
+from ir_studies.errors import SettingsError
 from ir_studies.layout import EXAMPLE
+from ir_studies.layout.settings import read_layout
+from ir_studies.studies import study_of
 
 STUDIES = Path(__file__).parents[2] / "docs" / "studies.md"
 HEAD = "format: ir_layout/1\ncell: demo\n"

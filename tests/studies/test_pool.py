@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from ir_studies import WorkerError
+from ir_studies.errors import WorkerError
 from ir_studies.work import Job, StudyJob
 from ir_studies.work.pool import Pool
 

@@ -16,8 +16,9 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_planner import Goal, Planner, RequestError
 from ir_planner.search.with_ompl import charge_to, missing
-from ir_studies.arena import ArenaEntry, ArenaSettings
+from ir_studies.arena import ArenaSettings
 from ir_studies.arena.one_run import charged, excuse, maker, others_time, processor_time, warm_up
+from ir_studies.arena.settings import ArenaEntry
 from ir_values.arrays import FloatArray
 
 ENTRY = ArenaEntry("rrt_connect", "open", "home->p1", 0, "", "synchronous")

@@ -10,11 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from ir_description import Task, cell_to_yaml, load_cell
+from ir_description import cell_to_yaml, load_cell
+from ir_description.cell import Task
 from ir_recorder.recording.arithmetic import arithmetic
-from ir_studies import FolderError, Means, WorkerError, run_arena
+from ir_studies import Means, run_arena
 from ir_studies.arena import ArenaSettings
 from ir_studies.arena.one_run import maker as arena_maker
+from ir_studies.errors import FolderError, WorkerError
 from ir_studies.statistics.runs import maker as statistics_maker
 from ir_studies.work import fingerprint
 from ir_studies.work.results import digest_of_tasks, refuse_others, task_digests

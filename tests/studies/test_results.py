@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ir_studies import FolderError
+from ir_studies.errors import FolderError
 from ir_studies.work import Job, Results
 from ir_studies.work.results import NAME
 

@@ -17,11 +17,13 @@ from scipy.stats import bootstrap, skew, t, ttest_1samp
 from ir_cli.main import main
 from ir_planner import Planner
 from ir_recorder.analysis.intervals import mean_of
-from ir_studies import FolderError, Means, SettingsError, read_study, study_of
+from ir_studies import Means, read_study
+from ir_studies.errors import FolderError, SettingsError
 from ir_studies.statistics.findings import findings_of
 from ir_studies.statistics.outputs import columns, page_html, summary_of
 from ir_studies.statistics.runs import NEAREST, maker, pair_of, places_of
 from ir_studies.statistics.settings import EXAMPLE, StatisticsSettings, statistics_settings
+from ir_studies.studies import study_of
 
 ASKED = StatisticsSettings("open")
 shares = st.floats(-0.5, 0.5).map(lambda x: round(x, 4))

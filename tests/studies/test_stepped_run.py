@@ -7,7 +7,8 @@ from functools import cache
 
 import pytest
 
-from ir_description import Cell, ProcessTimes, load_cell
+from ir_description import Cell, load_cell
+from ir_description.cell import ProcessTimes
 from ir_planner import Planner, SteadyPlan
 from ir_recorder.analysis.tending import Tending, tending_of
 from ir_studies.stepped_run import driven_program

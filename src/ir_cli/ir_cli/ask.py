@@ -36,7 +36,9 @@ from ir_cli.planning import (
     sentences,
 )
 from ir_cli.traces import write_trace
-from ir_description import CellPath, UnknownNameError, is_path, load_path
+from ir_description import UnknownNameError, is_path
+from ir_description.cell import CellPath
+from ir_description.library import load_path
 from ir_msgs_py.cartesian import CartesianPath
 from ir_msgs_py.report import DistancePair
 from ir_planner import CartesianPlan, Planner

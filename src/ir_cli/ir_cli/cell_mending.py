@@ -15,7 +15,8 @@ import numpy as np
 
 from ir_cli.planning import CEILING, clock
 from ir_cli.station_access import MARGIN, AccessLine, StationVisit, lines_of, visits
-from ir_description import AllowedContact, Cell, Equipment, Station, cell_to_yaml
+from ir_description import Cell, Equipment, Station, cell_to_yaml
+from ir_description.cell import AllowedContact
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Planner
 from ir_values.arrays import FloatArray

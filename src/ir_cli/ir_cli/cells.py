@@ -26,21 +26,17 @@ from ir_cli.output import (
 from ir_cli.planning import add_cell
 from ir_description import (
     Cell,
-    CellFinding,
     DescriptionFileError,
     RobotCells,
     UnknownNameError,
     bundled_cells,
-    bundled_robot_cells,
-    cell_file_errors,
-    cell_file_line,
     check_cell,
-    check_robot_cell,
     is_path,
     load_cell,
     load_robot_cells,
-    robot_in,
 )
+from ir_description.cell_review import CellFinding, check_robot_cell
+from ir_description.library import bundled_robot_cells, cell_file_errors, cell_file_line, robot_in
 
 if TYPE_CHECKING:
     from ir_cli.cell_mending import Suggestion

@@ -24,14 +24,10 @@ from ir_cli.output import (
     text,
 )
 from ir_cli.planning import add_cell, planner_of, sentences
-from ir_description import (
-    DATA_SHEET,
-    PowerParameters,
-    centre_deviations,
-    load_cell,
-    load_power_parameters,
-    power_parameters_to_yaml,
-)
+from ir_description import PowerParameters, load_cell
+from ir_description.files import power_parameters_to_yaml
+from ir_description.library import load_power_parameters
+from ir_description.robot import DATA_SHEET, centre_deviations
 from ir_recorder import analyse, read_recording
 from ir_recorder.analysis.indirect import Agreement, MeasuredEnergies, agreement, agreement_of
 from ir_recorder.fit import (

@@ -16,7 +16,6 @@ import yaml
 from ir_cli.errors import CommandError, InputError
 from ir_cli.traces import read_trace, write_trace
 from ir_description import (
-    IDLE,
     Cell,
     DescriptionError,
     DescriptionFileError,
@@ -25,6 +24,7 @@ from ir_description import (
     load_cell,
 )
 from ir_description.files import read_regular_file
+from ir_description.robot import IDLE
 from ir_msgs_py.modes import drive_bus_up
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions

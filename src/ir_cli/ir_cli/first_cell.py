@@ -9,8 +9,9 @@ import numpy as np
 from ir_cli.errors import CommandError, InputError, unknown_name
 from ir_cli.robot_shapes import floor_below, lowest_points
 from ir_cli.self_pairs import SAFETY
-from ir_description import Cell, RobotModel, UnknownNameError, is_path, robot_named
+from ir_description import Cell, RobotModel, UnknownNameError, is_path
 from ir_description.files import read_cell
+from ir_description.library import robot_named
 from ir_kernels import Chain, CollisionModel
 from ir_values.arrays import BoolArray, FloatArray
 

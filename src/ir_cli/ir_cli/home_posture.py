@@ -8,8 +8,9 @@ import numpy as np
 
 from ir_cli.robot_shapes import FLOOR_ROOM, floor_below, lowest_points
 from ir_cli.self_pairs import ROOM, SAFETY, Pairs
-from ir_description import Capsule, InvalidValueError
+from ir_description import InvalidValueError
 from ir_description.files.making import UrdfArm, holding_torques
+from ir_description.shapes import Capsule
 from ir_kernels import Chain, CollisionModel
 from ir_values.arrays import BoolArray, FloatArray
 

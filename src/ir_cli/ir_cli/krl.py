@@ -33,26 +33,20 @@ from ir_cli.planning import (
     planner_of,
     sentences,
 )
-from ir_krl import (
-    ARCHIVES,
-    BYTES_MAX,
+from ir_krl import Followed, parse, read_project
+from ir_krl.language import SourceFile
+from ir_krl.project import ARCHIVES, BYTES_MAX, text_of
+from ir_krl.run import Note, worst_first
+from ir_krl.settings import settings_of, stubs
+from ir_krl.write import (
     PLC_PAUSE,
     STYLES,
     URSCRIPT,
-    Followed,
     FrameNumbers,
-    Note,
     PlcPause,
-    SourceFile,
     frame_numbers,
-    parse,
     plc_input,
     read_plc_table,
-    read_project,
-    settings_of,
-    stubs,
-    text_of,
-    worst_first,
 )
 from ir_planner import Planner
 from ir_planner.krl import (

@@ -22,9 +22,9 @@ from ir_description import (
     RobotModel,
     UnknownNameError,
     is_path,
-    robot_named,
 )
 from ir_description.files import read_cell
+from ir_description.library import robot_named
 from ir_kernels import Chain
 from ir_planner import Planner, PlanOptions
 from ir_values.files import inside

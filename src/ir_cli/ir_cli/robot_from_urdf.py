@@ -15,7 +15,7 @@ from ir_cli.home_posture import Postures
 from ir_cli.robot_remarks import remarks_on
 from ir_cli.robot_shapes import Shapes, capsules_of
 from ir_cli.self_pairs import Pairs, kept_sentences, pairs_of
-from ir_description import DescriptionError, InvalidValueError, RobotFileError, RobotModel
+from ir_description import DescriptionError, InvalidValueError, RobotModel
 from ir_description.files import read_regular_file, robot_from_yaml, text_of
 from ir_description.files.making import (
     DriveSheet,
@@ -37,6 +37,7 @@ from ir_kernels import Chain
 from ir_kernels import InputError as KernelInputError
 from ir_kernels.wrist_geometry import arm_lines
 from ir_values.arrays import FloatArray
+from ir_values.errors import RobotFileError
 from ir_values.output_files import write_file
 
 BYTES_MAX = 8_000_000

@@ -10,18 +10,12 @@ import numpy as np
 
 from ir_cli.self_pairs import kept_sentences
 from ir_description import Load, RobotModel
-from ir_kernels import (
-    Chain,
-    CollisionModel,
-    DynamicsModel,
-    SearchedIk,
-    SphericalWristIk,
-    ThreeParallelIk,
-    inverse_kinematics,
-)
+from ir_kernels import Chain, CollisionModel, DynamicsModel, inverse_kinematics
 from ir_kernels import (
     InputError as KernelInputError,
 )
+from ir_kernels.inverse_kinematics import SearchedIk, ThreeParallelIk
+from ir_kernels.spherical_wrist import SphericalWristIk
 from ir_kernels.wrist_geometry import arm_lines
 from ir_values.arrays import FloatArray
 

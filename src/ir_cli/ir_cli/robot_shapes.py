@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ir_description import Capsule
 from ir_description.files.convex_pieces import fine_triangles
 from ir_description.files.making import (
     CapsuleFit,
@@ -18,6 +17,7 @@ from ir_description.files.making import (
     fitted,
     with_overhang,
 )
+from ir_description.shapes import Capsule
 from ir_kernels import Chain
 from ir_values.arrays import FloatArray
 

@@ -26,9 +26,9 @@ from ir_description import (
     bundled_robots,
     is_path,
     load_robot,
-    robot_file_errors,
-    robot_named,
 )
+from ir_description.files import robot_file_errors
+from ir_description.library import robot_named
 
 if TYPE_CHECKING:
     from ir_cli.robot_from_urdf import RobotSource

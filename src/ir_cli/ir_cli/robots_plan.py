@@ -11,7 +11,8 @@ from pathlib import Path
 from ir_cli.errors import CommandError, InputError
 from ir_cli.output import Columns, Row, number, print_csv, print_json, print_table, text
 from ir_cli.planning import failed, options_of, sentences
-from ir_description import RobotCells, load_robot_cells, robot_in
+from ir_description import RobotCells, load_robot_cells
+from ir_description.library import robot_in
 from ir_planner import PlannerSettings
 from ir_planner.robots import RobotsPlan, plan_robots
 from ir_recorder.report.files import write_output

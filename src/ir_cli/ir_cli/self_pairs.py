@@ -18,11 +18,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ir_description import Capsule
 from ir_description.files.convex_pieces import fine_triangles, halved
 from ir_description.files.making import LinkBody, UrdfArm, beside_axis
 from ir_description.robot import ReducedDistance
-from ir_kernels import Chain, CollisionModel, Surface
+from ir_description.shapes import Capsule
+from ir_kernels import Chain, CollisionModel
+from ir_kernels.surfaces import Surface
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 SAFETY = 0.02

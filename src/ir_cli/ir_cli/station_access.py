@@ -11,7 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_cli.output import Columns, Row, number, text
-from ir_description import AllowedContact, Cell, CellFinding, Station
+from ir_description import Cell, Station
+from ir_description.cell import AllowedContact
+from ir_description.cell_review import CellFinding
 from ir_planner.configurations import free_configurations, no_configuration
 from ir_planner.program.steps import Route, Scenes, placed_steps
 from ir_planner.scene import PlanningScene, tcp_inside

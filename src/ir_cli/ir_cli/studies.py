@@ -13,9 +13,10 @@ from typing import TypeVar
 
 from ir_cli.errors import InputError
 from ir_cli.output import ProgressLine, print_json, table
-from ir_studies import KINDS, Means, read_settings, read_study, run_arena
-from ir_studies.arena import EXAMPLE, ArenaSettings, arena_settings
+from ir_studies import Means, read_study, run_arena
+from ir_studies.arena import EXAMPLE, ArenaSettings, arena_settings, read_settings
 from ir_studies.cells import CellAnswer, hurried, read_instances, solve_cell
+from ir_studies.studies import KINDS
 from ir_studies.work import MOST_WORKERS
 
 # Options and progress of all studies.

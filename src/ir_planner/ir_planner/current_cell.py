@@ -4,15 +4,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from threading import Lock
 
-from ir_description import (
-    Cell,
-    PowerData,
-    RobotModel,
-    cell_from_yaml,
-    cell_hash,
-    cell_in,
-    load_cell,
-)
+from ir_description import Cell, PowerData, RobotModel, cell_from_yaml, cell_hash, load_cell
+from ir_description.cell import cell_in
 from ir_msgs_py.announcements import DATA, DRIVER, CarriedLoad, ControllerTimers, MachineState
 from ir_msgs_py.modes import TransitionTimes
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD

@@ -17,7 +17,8 @@ from typing import TypedDict, Unpack
 
 import numpy as np
 
-from ir_description import VIA_TOLERANCE, Cell, CellPath, PowerData, ToolTilt, cell_hash, is_path
+from ir_description import Cell, PowerData, cell_hash, is_path
+from ir_description.cell import VIA_TOLERANCE, CellPath, ToolTilt
 from ir_kernels import InputError
 from ir_kernels.data import pose as rigid_pose
 from ir_msgs_py.cartesian import CartesianPath

@@ -5,12 +5,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import cast
 
-from ir_description import (
-    DATA_SHEET,
-    RobotModel,
-    power_parameters_of,
-    read_power_parameters,
-)
+from ir_description import RobotModel
+from ir_description.library import power_parameters_of, read_power_parameters
+from ir_description.robot import DATA_SHEET
 from ir_kernels.power import Regeneration
 from ir_msgs_py.modes import TransitionTimes
 from ir_planner.configurations import InteractionSettings

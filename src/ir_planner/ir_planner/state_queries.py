@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_description import LIMIT_TOLERANCE
+from ir_description.robot import LIMIT_TOLERANCE
 from ir_kernels.collision import MinDistance
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.status import StatusCode

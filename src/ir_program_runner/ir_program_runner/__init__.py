@@ -2,17 +2,12 @@
 machines.
 """
 
-from ir_program_runner.fulfilment import DriverPort, Fulfilment, Ports
 from ir_program_runner.machines import Machines
 from ir_program_runner.program import Program, ProgramResult
-from ir_program_runner.settings import LinkSettings, ProgramSettings
+from ir_program_runner.settings import ProgramSettings
 
 __all__ = [
-    "DriverPort",
-    "Fulfilment",
-    "LinkSettings",
     "Machines",
-    "Ports",
     "Program",
     "ProgramResult",
     "ProgramSettings",

@@ -9,7 +9,8 @@ from typing import Protocol
 
 import numpy as np
 
-from ir_description import Cell, ProcessTimes
+from ir_description import Cell
+from ir_description.cell import ProcessTimes
 from ir_msgs_py.plc import Signal
 from ir_values.errors import InvalidValueError
 

@@ -9,12 +9,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from ir_description import (
-    DescriptionError,
-    PowerParameters,
-    cell_from_yaml,
-    load_power_parameters,
-)
+from ir_description import DescriptionError, PowerParameters, cell_from_yaml
+from ir_description.library import load_power_parameters
 from ir_recorder.analysis import Analysis, analyse, findings
 from ir_recorder.analysis.meter import with_meter
 from ir_recorder.arguments import add_roots, roots_of

@@ -13,7 +13,8 @@ from ir_description import Cell
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.traces import Trace
-from ir_sim_driver import DriverError, ErrorCode, TrajectoryGoal, carried, make_simulation
+from ir_sim_driver import DriverError, ErrorCode, TrajectoryGoal, make_simulation
+from ir_sim_driver.plant import carried
 from ir_studies.errors import DrivingError
 from ir_values.arrays import FloatArray
 

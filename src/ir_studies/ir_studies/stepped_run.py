@@ -24,15 +24,9 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_program_runner import Machines, Program, ProgramResult, ProgramSettings
 from ir_program_runner import requests as ask
 from ir_recorder.analysis.tending import SignalChange, TendedStep
-from ir_sim_driver import (
-    DriverError,
-    ErrorCode,
-    RequestRefusedError,
-    Simulation,
-    TrajectoryGoal,
-    carried,
-    make_simulation,
-)
+from ir_sim_driver import DriverError, ErrorCode, Simulation, TrajectoryGoal, make_simulation
+from ir_sim_driver.errors import RequestRefusedError
+from ir_sim_driver.plant import carried
 from ir_studies.errors import DrivingError
 from ir_values.arrays import FloatArray
 

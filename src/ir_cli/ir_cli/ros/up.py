@@ -24,19 +24,16 @@ from ir_msgs_py.ros.network import DOMAIN, MOST_DOMAIN
 from ir_msgs_py.ros.parameters import IntrospectionSettings
 from ir_planner import PlannerSettings
 from ir_planner.node.moveit_requests import MoveItSettings
-from ir_program_runner import LinkSettings, ProgramSettings
+from ir_program_runner import ProgramSettings
+from ir_program_runner.settings import LinkSettings
 from ir_recorder.recording.settings import RecorderSettings
-from ir_sim_driver import (
-    ControllerSettings,
-    ControlSettings,
-    ExecutionSettings,
-    IdleTimes,
-    LoadCheckSettings,
-    PlcSettings,
-    usable_links,
-)
-from ir_sim_driver.controller import SupervisionSettings
+from ir_sim_driver import ExecutionSettings
+from ir_sim_driver.controller import ControllerSettings, SupervisionSettings
+from ir_sim_driver.load_check import LoadCheckSettings
 from ir_sim_driver.node.parameters import NodeSettings
+from ir_sim_driver.plant import ControlSettings
+from ir_sim_driver.plc import PlcSettings, usable_links
+from ir_sim_driver.power import IdleTimes
 from ir_studies.settings import StudiesSettings
 from ir_values.errors import ParameterError
 from ir_values.settings import Setting, tree

@@ -15,11 +15,11 @@ from ir_description import (
     DescriptionError,
     UnknownNameError,
     bundled_cells,
-    cell_file_errors,
     cell_to_yaml,
     is_path,
     load_cell,
 )
+from ir_description.library import cell_file_errors
 from ir_values.output_files import write_file
 
 SUFFIXES = (".yaml", ".yml", ".stl", ".obj", ".glb", ".gltf", ".bin")

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_description import Cell, PartPlaces, cell_in
+from ir_description import Cell, PartPlaces
+from ir_description.cell import cell_in
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.savings import Side
 from ir_recorder.analysis.clearance import places_after

@@ -41,7 +41,7 @@ from ir_description.cell.equipment import (
     zone_around,
 )
 from ir_description.cell.moving import cell_in, machine_in, sweep_speeds
-from ir_description.cell.part_routes import WAYS_MAX, check_route, part_routes
+from ir_description.cell.part_routes import check_route, part_routes
 from ir_description.cell.program import (
     AUTO,
     NUMBER_MAX,
@@ -81,7 +81,6 @@ __all__ = [
     "VIA_TOLERANCE",
     "VIA_TOLERANCES",
     "VISITS",
-    "WAYS_MAX",
     "ZONE_KINDS",
     "ZONE_MAX",
     "AllowedContact",

@@ -5,21 +5,15 @@ from ir_description.files.cell_writer import cell_hash, cell_to_yaml
 from ir_description.files.power_file import (
     bundled_controller,
     bundled_controllers,
-    confidence_marks,
     power_from_yaml,
     power_parameters_from_yaml,
     power_parameters_to_yaml,
 )
 from ir_description.files.program_reader import path_from_yaml
-from ir_description.files.robot_file import (
-    read_robot,
-    robot_errors,
-    robot_file_errors,
-    robot_from_yaml,
-)
+from ir_description.files.robot_file import read_robot, robot_file_errors, robot_from_yaml
 from ir_description.files.subject_lines import subject_line
 from ir_description.files.urdf_writer import robot_urdf
-from ir_values.files import is_path, is_utf16, read_regular_file, text_of
+from ir_values.files import is_path, read_regular_file, text_of
 from ir_values.yaml_tree import plain_yaml
 
 __all__ = [
@@ -29,9 +23,7 @@ __all__ = [
     "cell_errors",
     "cell_hash",
     "cell_to_yaml",
-    "confidence_marks",
     "is_path",
-    "is_utf16",
     "path_from_yaml",
     "plain_yaml",
     "power_from_yaml",
@@ -41,7 +33,6 @@ __all__ = [
     "read_regular_file",
     "read_robot",
     "read_robot_cells",
-    "robot_errors",
     "robot_file_errors",
     "robot_from_yaml",
     "robot_urdf",

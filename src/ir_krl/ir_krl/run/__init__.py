@@ -20,7 +20,6 @@ from ir_krl.run.commands import (
 from ir_krl.run.memory import SignalRange
 from ir_krl.run.notes import Effect, Note, worst_first
 from ir_krl.run.program import Followed, UnknownRoutine, follow
-from ir_krl.run.standing import Kinematics
 from ir_krl.run.values import FRAME_NAMES
 
 __all__ = [
@@ -30,7 +29,6 @@ __all__ = [
     "Command",
     "Effect",
     "Followed",
-    "Kinematics",
     "Motion",
     "Note",
     "Payload",

@@ -1,6 +1,6 @@
 """Texts of a program: .src and .dat, and the PLC's part of its pauses."""
 
-from ir_krl.write.names import NAME_MAX, Numbers, SignalNames, Wiring, check_name
+from ir_krl.write.names import Numbers, check_name
 from ir_krl.write.numbering import (
     BASES_MAX,
     Chosen,
@@ -37,7 +37,6 @@ from ir_krl.write.statements import (
 __all__ = [
     "BASES_MAX",
     "GRIP",
-    "NAME_MAX",
     "PLC_DONE",
     "PLC_PAUSE",
     "PLC_THERE",
@@ -48,10 +47,8 @@ __all__ = [
     "FrameNumbers",
     "Numbers",
     "PlcPause",
-    "SignalNames",
     "Style",
     "Texts",
-    "Wiring",
     "WrittenHandling",
     "WrittenMove",
     "WrittenPath",

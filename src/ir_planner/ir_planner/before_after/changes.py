@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_description import drawn_robots
+from ir_description.robot import drawn_robots
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.savings import HopSaving, Saving, Side, StepChange
 from ir_planner.checks import JouleInterval, interval, movement_energy, total_report

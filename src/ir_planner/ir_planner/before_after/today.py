@@ -5,8 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_description import CellPath, Load
-from ir_krl import PLC_DONE, SourcePlace
+from ir_description import Load
+from ir_description.cell import CellPath
+from ir_krl import SourcePlace
+from ir_krl.write import PLC_DONE
 from ir_msgs_py.cartesian import LINE, CartesianPath
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.status import StatusCode

@@ -4,7 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_description import Cell, CellPath, Equipment, ProgramStep, Signal, Station, Zone
+from ir_description import Cell, Equipment, ProgramStep, Station
+from ir_description.cell import CellPath, Zone
+from ir_msgs_py.plc import Signal
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_planner.before_after.today import Today, TodayMotion, driven_as, nothing_moves, same_poses
 from ir_planner.checks import evaluate_trajectory

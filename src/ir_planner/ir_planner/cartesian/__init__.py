@@ -2,10 +2,9 @@
 angle.
 """
 
-from ir_planner.cartesian.path_parts import Arc, ArcLength, Line, Through, arc_through
+from ir_planner.cartesian.path_parts import Arc, Line, arc_through
 from ir_planner.cartesian.plan import (
     CartesianPlan,
-    ChosenMovement,
     checked_path_options,
     choices_along,
     heading_status,
@@ -15,13 +14,10 @@ from ir_planner.cartesian.tool_path import HeadingError, PathRefusedError
 
 __all__ = [
     "Arc",
-    "ArcLength",
     "CartesianPlan",
-    "ChosenMovement",
     "HeadingError",
     "Line",
     "PathRefusedError",
-    "Through",
     "arc_through",
     "checked_path_options",
     "choices_along",

@@ -1,6 +1,6 @@
 """Checks of a configuration or a trajectory: free, limits, torque, clearance, energy, proof."""
 
-from ir_planner.checks.distances import nearest_pair, nearest_pairs, pair_value
+from ir_planner.checks.distances import nearest_pair, pair_value
 from ir_planner.checks.energy import (
     MovementEnergy,
     carried,
@@ -23,11 +23,9 @@ from ir_planner.checks.free_space import (
     first_too_near,
     state_check,
     too_near,
-    too_near_sentence,
 )
 from ir_planner.checks.intervals import (
     JouleInterval,
-    energy_and_slope,
     holding_slope,
     interval,
     movement_spread,
@@ -83,7 +81,6 @@ __all__ = [
     "clearance_violation",
     "end_in_collision",
     "end_outside_cone",
-    "energy_and_slope",
     "evaluate_trajectory",
     "first_too_near",
     "holding_slope",
@@ -95,7 +92,6 @@ __all__ = [
     "movement_shapes",
     "movement_spread",
     "nearest_pair",
-    "nearest_pairs",
     "pair_value",
     "peak_power",
     "spread",
@@ -103,7 +99,6 @@ __all__ = [
     "state_check",
     "tilt_violation",
     "too_near",
-    "too_near_sentence",
     "tool_derivatives",
     "torque_proof",
     "total_report",

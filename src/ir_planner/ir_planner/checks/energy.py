@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_kernels import DcBus, dc_bus
+from ir_kernels import dc_bus
+from ir_kernels.power import DcBus
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import extremes, motion_at
 from ir_planner.scene import PlanningScene

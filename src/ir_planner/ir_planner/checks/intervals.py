@@ -16,8 +16,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from ir_description import AXIS_UNITS, IDLE, LINK, PowerParameters, drawn_robots, interval_over
-from ir_kernels import DcBus, dc_bus, portable
+from ir_description import PowerParameters
+from ir_description.robot import AXIS_UNITS, IDLE, LINK, drawn_robots, interval_over
+from ir_kernels import dc_bus, portable
+from ir_kernels.power import DcBus
 from ir_msgs_py.trajectory import JointTrajectory, MotionSamples
 from ir_planner.curves import motion_at
 from ir_planner.scene import CENTRE_STEP, RUNNING, PlanningScene

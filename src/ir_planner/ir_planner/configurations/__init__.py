@@ -15,7 +15,6 @@ from ir_planner.configurations.inverse_kinematics import (
     configuration_log,
     free_configurations,
     no_configuration,
-    ranked_solutions,
 )
 
 __all__ = [
@@ -29,6 +28,5 @@ __all__ = [
     "configurations_at",
     "free_configurations",
     "no_configuration",
-    "ranked_solutions",
     "searched_configurations",
 ]

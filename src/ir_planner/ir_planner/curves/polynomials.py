@@ -13,7 +13,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ir_kernels import Extrema, polynomial_extrema, polynomial_samples, portable
+from ir_kernels import portable
+from ir_kernels.limits import Extrema, polynomial_extrema, polynomial_samples
 from ir_msgs_py.trajectory import JointTrajectory, MotionSamples
 from ir_values.arrays import BoolArray, FloatArray
 

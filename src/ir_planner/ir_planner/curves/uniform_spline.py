@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_kernels import end_points
+from ir_kernels.spline_terms import end_points
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_values.arrays import FloatArray
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from ir_description import Cell, PartPlaces, PartRoute, ProgramStep
+from ir_description import Cell, PartPlaces, ProgramStep
+from ir_description.cell import PartRoute
 from ir_planner.cycle import Curve
 from ir_planner.flexible.tending_cell import all_lying, held_from, with_parts_at
 from ir_planner.program import (

@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from ir_description import Cell, PartRoute, ProgramStep
+from ir_description import Cell, ProgramStep
+from ir_description.cell import PartRoute
 from ir_planner.cycle import ModeWait, SteadyCycle, Visit
 from ir_planner.flexible.tending_cell import (
     front_name,

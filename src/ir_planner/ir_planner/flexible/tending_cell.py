@@ -11,17 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ir_description import (
-    Cell,
-    CellSignal,
-    Part,
-    PartPlaces,
-    PartRoute,
-    ProgramStep,
-    Signal,
-    Station,
-)
+from ir_description import Cell, PartPlaces, ProgramStep, Station
+from ir_description.cell import CellSignal, Part, PartRoute
 from ir_kernels import portable
+from ir_msgs_py.plc import Signal
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.program import AUTO

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from ir_kernels import portable
-from ir_krl import Blend, KrlMotionError, Motion, SourcePlace, Speeds, Target
+from ir_krl import KrlMotionError, Motion, SourcePlace
+from ir_krl.run import Blend, Speeds, Target
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.cartesian import Arc, Line, arc_through
 from ir_planner.curves import turn_of, turned_evenly

@@ -7,18 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ir_krl import (
+from ir_krl import Followed, KrlMotionError, Motion, SourcePlace
+from ir_krl.run import (
     AdvanceStop,
     Blend,
     Command,
     Effect,
-    Followed,
-    KrlMotionError,
-    Motion,
     Note,
     Payload,
     SetOutput,
-    SourcePlace,
     Speeds,
     SplineBlock,
     StandStill,

@@ -10,15 +10,14 @@ import numpy as np
 from ir_description import Cell
 from ir_description.poses import inverse
 from ir_kernels import portable
-from ir_krl import (
+from ir_krl import Followed, KrlError
+from ir_krl.run import Payload
+from ir_krl.write import (
     BASES_MAX,
     Attached,
     Chosen,
-    Followed,
     FrameNumbers,
-    KrlError,
     Numbers,
-    Payload,
     PlcPause,
     Style,
     Texts,

@@ -7,7 +7,8 @@ import numpy as np
 
 from ir_description.poses import abc_from_rotation, inverse, rotation_from_abc
 from ir_kernels import Chain, portable
-from ir_krl import FRAME_NAMES, Effect, KrlMotionError, Note, SourcePlace, Target
+from ir_krl import KrlMotionError, SourcePlace
+from ir_krl.run import FRAME_NAMES, Effect, Note, Target
 from ir_planner.scene import PlanningScene
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 

@@ -7,7 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from ir_kernels import portable
-from ir_krl import KrlError, Style, WrittenMove
+from ir_krl import KrlError
+from ir_krl.write import Style, WrittenMove
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory

@@ -6,19 +6,9 @@ from typing import Protocol
 import numpy as np
 
 from ir_description import RobotModel
-from ir_krl import (
-    PLC_THERE,
-    Attached,
-    Followed,
-    Numbers,
-    Style,
-    Texts,
-    WrittenStatement,
-    follow,
-    parse,
-    written,
-)
+from ir_krl import Followed, follow, parse
 from ir_krl.urscript import JointLimits, follow_urscript, written_urscript
+from ir_krl.write import PLC_THERE, Attached, Numbers, Style, Texts, WrittenStatement, written
 from ir_planner.scene import PlanningScene
 from ir_values.arrays import FloatArray
 

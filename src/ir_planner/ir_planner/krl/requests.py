@@ -6,23 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_kernels import portable
-from ir_krl import (
-    PLC_DONE,
-    PLC_PAUSE,
-    Followed,
-    FrameNumbers,
-    KrlError,
-    KrlMotionError,
-    Note,
-    PlcPause,
-    SignalRange,
-    SourceFile,
-    SourcePlace,
-    follow,
-    frame_numbers,
-    parse,
-)
+from ir_krl import Followed, KrlError, KrlMotionError, SourcePlace, follow, parse
+from ir_krl.language import SourceFile
+from ir_krl.run import Note, SignalRange
 from ir_krl.urscript import follow_urscript
+from ir_krl.write import PLC_DONE, PLC_PAUSE, FrameNumbers, PlcPause, frame_numbers
 from ir_msgs_py.modes import TransitionTimes
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport

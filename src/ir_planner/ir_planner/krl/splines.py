@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ir_kernels import portable
-from ir_krl import Blend, KrlMotionError, Motion, Speeds, SplineBlock, Target, TimeBlock
+from ir_krl import KrlMotionError, Motion
+from ir_krl.run import Blend, Speeds, SplineBlock, Target, TimeBlock
 from ir_msgs_py.cartesian import (
     CIRCLE,
     LINE,

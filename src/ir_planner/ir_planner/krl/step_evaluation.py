@@ -3,8 +3,10 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from ir_description import Cell, PowerData, ProgramStep, Signal, cell_in
-from ir_krl import WrittenStatement
+from ir_description import Cell, PowerData, ProgramStep
+from ir_description.cell import cell_in
+from ir_krl.write import WrittenStatement
+from ir_msgs_py.plc import Signal
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory

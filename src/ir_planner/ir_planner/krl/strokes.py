@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_kernels import portable
-from ir_krl import WrittenPath
+from ir_krl.write import WrittenPath
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory

@@ -8,10 +8,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ir_description import Cell, InvalidValueError, Load, PartPlaces, ProgramStep, Signal
+from ir_description import Cell, InvalidValueError, Load, PartPlaces, ProgramStep
 from ir_description.poses import abc_from_rotation, rotation_from_abc
 from ir_kernels import portable
-from ir_krl import GRIP, Effect, KrlMotionError, Note, Payload, SignalRange, SourcePlace
+from ir_krl import KrlMotionError, SourcePlace
+from ir_krl.run import Effect, Note, Payload, SignalRange
+from ir_krl.write import GRIP
+from ir_msgs_py.plc import Signal
 from ir_planner.krl.geometry import tool_in_flange
 from ir_planner.program import Doors, Scenes, doors_along
 from ir_planner.scene import PlanningScene

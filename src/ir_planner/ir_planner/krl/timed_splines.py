@@ -3,7 +3,7 @@
 import numpy as np
 
 from ir_kernels import portable
-from ir_krl import WrittenSpline
+from ir_krl.write import WrittenSpline
 from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory

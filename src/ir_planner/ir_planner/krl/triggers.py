@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_krl import Switch, Target
+from ir_krl.run import Switch, Target
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.krl.blended_motions import Move
 from ir_planner.krl.geometry import Arm

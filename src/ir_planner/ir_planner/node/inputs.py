@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from sensor_msgs.msg import JointState
 
-from ir_description import Cell, CellPath
+from ir_description import Cell
+from ir_description.cell import CellPath
 from ir_kernels import portable
 from ir_msgs_py.cartesian import POSES_MAX, CartesianPath, CartesianSegment
 from ir_msgs_py.names import BASE_FRAME

@@ -14,8 +14,9 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import JointState
 
-from ir_description import Cell, fixed_frames
+from ir_description import Cell
 from ir_description.poses import composed, inverse, rotation_from_quaternion
+from ir_description.robot import fixed_frames
 from ir_kernels import portable
 from ir_msgs.msg import CartesianSegment, PlanOptions
 from ir_msgs.srv import ComputeIk, PlanCartesianMovement, PlanRegionalMovement

@@ -21,7 +21,8 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
 from visualization_msgs.msg import MarkerArray
 
-from ir_description import DescriptionError, read_cell_apart
+from ir_description import DescriptionError
+from ir_description.library import read_cell_apart
 from ir_kernels import compiled
 from ir_msgs.action import Plan
 from ir_msgs.msg import ProgramSavings as ProgramSavingsMsg

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ir_kernels import CubicPath, portable
+from ir_kernels import portable
+from ir_kernels.spline import CubicPath
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import ToolUse
 from ir_planner.curves import UniformSpline

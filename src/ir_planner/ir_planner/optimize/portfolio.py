@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_kernels import SplineStarts
+from ir_kernels.spline import SplineStarts
 from ir_planner.checks import FreeSpace
 from ir_planner.curves import UniformSpline, along_path
 from ir_planner.errors import TimingError

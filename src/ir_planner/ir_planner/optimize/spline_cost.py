@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ir_kernels import SplineCost, SplineTerms
+from ir_kernels import SplineCost
+from ir_kernels.spline_terms import SplineTerms
 from ir_planner.checks import ToolUse
 from ir_planner.curves import UniformSpline
 from ir_planner.request import Context

@@ -5,7 +5,7 @@ modes.
 from ir_planner.program.chain import cheapest_chain
 from ir_planner.program.choice import Choice
 from ir_planner.program.more_work import chosen
-from ir_planner.program.movement_fronts import FrontPoint, Ladder, TimeValues
+from ir_planner.program.movement_fronts import Ladder, TimeValues
 from ir_planner.program.movements import Movements
 from ir_planner.program.pauses import (
     AUTO,
@@ -15,12 +15,11 @@ from ir_planner.program.pauses import (
     Rests,
     Steps,
     at_once,
-    pause_by_itself,
     rests_at,
     spent,
     switch_times,
 )
-from ir_planner.program.program import Outlook, outlook, plan_program, prepared, program_of
+from ir_planner.program.program import outlook, plan_program, prepared, program_of
 from ir_planner.program.request import (
     ProgramPlan,
     ProgramRequest,
@@ -62,11 +61,9 @@ __all__ = [
     "Charge",
     "Choice",
     "Doors",
-    "FrontPoint",
     "HopPart",
     "Ladder",
     "Movements",
-    "Outlook",
     "PauseLengths",
     "PlacedStep",
     "PlannedPause",
@@ -96,7 +93,6 @@ __all__ = [
     "lengths_of",
     "nobody",
     "outlook",
-    "pause_by_itself",
     "placed_steps",
     "plan_program",
     "prepared",

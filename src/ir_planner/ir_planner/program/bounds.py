@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_kernels import SplineCost, SplineTerms, portable
+from ir_kernels import SplineCost, portable
+from ir_kernels.spline_terms import SplineTerms
 from ir_planner.curves import UniformSpline, along_path, fewest_seconds
 from ir_planner.request import Context
 from ir_planner.scene import MotionLimits, PlanningScene

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Protocol, TypeVar
 
-from ir_description import StepVia
+from ir_description.cell import StepVia
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.search_log import SearchLog
 from ir_msgs_py.status import Status, StatusCode

@@ -4,7 +4,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ir_description import Cell, CellFinding, PowerData, ProgramStep
+from ir_description import Cell, PowerData, ProgramStep
+from ir_description.cell_review import CellFinding
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement, PlanningInfo, TrajectoryReport

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from ir_description import ROBOTS
+from ir_description.robot import ROBOTS
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.savings import ProgramSavings, Saving
 from ir_planner.checks import interval

@@ -10,12 +10,10 @@ from ir_description import (
     PartPlaces,
     PowerData,
     ProgramStep,
-    Signal,
-    StepKind,
-    ToolTilt,
     UnknownNameError,
-    cell_in,
 )
+from ir_description.cell import StepKind, ToolTilt, cell_in
+from ir_msgs_py.plc import Signal
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.errors import RequestError, unknown_name
 from ir_planner.request import POSTURES, one_tilt

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ir_description import OUTSIDE_MAX
+from ir_description.robot import OUTSIDE_MAX
 from ir_kernels.collision import FREE
 from ir_msgs_py.report import DistancePair, PlanningInfo, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode

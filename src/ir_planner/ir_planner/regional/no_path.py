@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ir_description import Body, Capsule, RobotModel
+from ir_description import Body, RobotModel
+from ir_description.shapes import Capsule
 from ir_kernels import portable
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import FreeSpace

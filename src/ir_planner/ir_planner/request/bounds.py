@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ir_description import TOOL_ACCELERATION_MAX, TOOL_SPEED_MAX
+from ir_description.robot import TOOL_ACCELERATION_MAX, TOOL_SPEED_MAX
 from ir_msgs_py.options import NO_TILT, ROBOTS_TIME_VALUE, PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory

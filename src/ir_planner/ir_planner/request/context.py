@@ -8,7 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ir_description import ToolLimits, ToolTilt
+from ir_description.cell import ToolTilt
+from ir_description.robot import ToolLimits
 from ir_msgs_py.options import NO_TILT, ROBOTS_TIME_VALUE, TILT_MAX, UP, PlanOptions
 from ir_msgs_py.report import PlanningInfo, PlanningStage, Rejection
 from ir_msgs_py.search_log import ConfigurationLog, SearchLog

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ir_description import LIMIT_TOLERANCE, OUTSIDE_MAX, Cell
+from ir_description import Cell
 from ir_description.poses import rotation_from_abc
+from ir_description.robot import LIMIT_TOLERANCE, OUTSIDE_MAX
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory, MotionSamples
 from ir_planner.errors import RequestError, unfit, unknown_name

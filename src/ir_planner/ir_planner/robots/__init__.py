@@ -1,12 +1,11 @@
 """Several robots in one cell: what could meet, zones that they pass in turns, the joint cycle."""
 
 from ir_planner.robots.arm_program import check_processes, check_repeatable
-from ir_planner.robots.joint_plan import RobotsPlan, SharedZone, plan_robots
+from ir_planner.robots.joint_plan import RobotsPlan, plan_robots
 from ir_planner.robots.meetings import check_places
 
 __all__ = [
     "RobotsPlan",
-    "SharedZone",
     "check_places",
     "check_processes",
     "check_repeatable",

@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_description import Capsule, Cell, CellSignal, Equipment
+from ir_description import Cell, Equipment
+from ir_description.cell import CellSignal
+from ir_description.shapes import Capsule
 from ir_kernels.swept import SweptArm
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.report import PlannedMovement

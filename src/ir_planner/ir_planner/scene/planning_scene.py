@@ -11,8 +11,6 @@ from functools import cached_property
 import numpy as np
 
 from ir_description import (
-    LINK,
-    AllowedContact,
     Cell,
     Load,
     PartPlaces,
@@ -20,19 +18,13 @@ from ir_description import (
     PowerParameters,
     RobotModel,
     Station,
-    Zone,
     data_sheet_of,
 )
-from ir_kernels import (
-    Chain,
-    CollisionModel,
-    DcBusParameters,
-    DynamicsModel,
-    InverseKinematics,
-    inverse_kinematics,
-    portable,
-)
-from ir_kernels.power import Regeneration
+from ir_description.cell import AllowedContact, Zone
+from ir_description.robot import LINK
+from ir_kernels import Chain, CollisionModel, DynamicsModel, inverse_kinematics, portable
+from ir_kernels.ik_set import InverseKinematics
+from ir_kernels.power import DcBusParameters, Regeneration
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError, unknown_name

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_description import ToolLimits
+from ir_description.robot import ToolLimits
 
 
 @dataclass(frozen=True)

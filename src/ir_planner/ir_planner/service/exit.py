@@ -9,7 +9,8 @@ from typing import Protocol
 
 import numpy as np
 
-from ir_description import Body, Station, Zone
+from ir_description import Body, Station
+from ir_description.cell import Zone
 from ir_kernels import CollisionModel
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Context, Work

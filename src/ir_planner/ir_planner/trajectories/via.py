@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ir_description import VIA_DISTANCE_MAX, VIA_MAX, VIA_TOLERANCE, VIA_TOLERANCES
+from ir_description.cell import VIA_DISTANCE_MAX, VIA_MAX, VIA_TOLERANCE, VIA_TOLERANCES
 from ir_kernels import portable
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode

@@ -2,24 +2,15 @@
 
 from ir_recorder.analysis.analyse import analyse
 from ir_recorder.analysis.checks import Finding, Tolerances, Verdict, findings, summary
-from ir_recorder.analysis.results import (
-    Analysis,
-    ProgramTotals,
-    Share,
-    StationUse,
-    StepResult,
-    Unshortened,
-)
+from ir_recorder.analysis.results import Analysis, ProgramTotals, Share, StepResult
 
 __all__ = [
     "Analysis",
     "Finding",
     "ProgramTotals",
     "Share",
-    "StationUse",
     "StepResult",
     "Tolerances",
-    "Unshortened",
     "Verdict",
     "analyse",
     "findings",

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ir_description import (
-    ROBOTS,
     Cell,
     DescriptionError,
     PowerData,
@@ -20,7 +19,7 @@ from ir_description import (
     cell_from_yaml,
     data_sheet_of,
 )
-from ir_description.robot import DATA_SHEET, DcLink
+from ir_description.robot import DATA_SHEET, ROBOTS, DcLink
 from ir_kernels import KernelError
 from ir_msgs_py.modes import deepest, drive_bus_up
 from ir_msgs_py.names import JOINT_NAMES

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_description import IDLE, LINK, Load, PowerParameters, RobotModel
-from ir_description.robot import DcLink
+from ir_description import Load, PowerParameters, RobotModel
+from ir_description.robot import IDLE, LINK, DcLink
 from ir_recorder.analysis.intervals import Mean, mean_of, spread_of
 from ir_recorder.analysis.results import Analysis
 from ir_recorder.errors import RecorderError

@@ -16,12 +16,10 @@ from ir_description import (
     PowerData,
     PowerParameters,
     RobotModel,
-    drawn_robots,
-    interval_over,
     load_power_data,
 )
 from ir_description.files import power_from_yaml
-from ir_description.robot import DcLink
+from ir_description.robot import DcLink, drawn_robots, interval_over
 from ir_kernels import DynamicsModel
 from ir_msgs_py.modes import drive_bus_up
 from ir_msgs_py.report import TrajectoryReport

@@ -13,7 +13,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ir_description import Cell, PowerData, interval_over
+from ir_description import Cell, PowerData
+from ir_description.robot import interval_over
 from ir_msgs_py.modes import REST_MODES
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.report import PlannedMovement

@@ -12,7 +12,8 @@ from typing import Protocol
 
 import numpy as np
 
-from ir_description import IDLE, IDLE_WATTS, PowerParameters
+from ir_description import PowerParameters
+from ir_description.robot import IDLE, IDLE_WATTS
 from ir_recorder.measure import PowerModel, Samples
 from ir_recorder.measure.power_model import Prepared
 from ir_values.arrays import BoolArray, FloatArray, IntArray

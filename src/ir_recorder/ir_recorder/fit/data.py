@@ -9,15 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ir_description import (
-    DATA_SHEET,
-    Cell,
-    DescriptionError,
-    Load,
-    PowerParameters,
-    RobotModel,
-    cell_from_yaml,
-)
+from ir_description import Cell, DescriptionError, Load, PowerParameters, RobotModel, cell_from_yaml
+from ir_description.robot import DATA_SHEET
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_recorder.analysis.loads import LoadTimeline, carried, load_timeline, normal
 from ir_recorder.errors import RecorderError

@@ -10,7 +10,8 @@ from itertools import combinations
 
 import numpy as np
 
-from ir_description import AXIS_UNITS, PowerParameters
+from ir_description import PowerParameters
+from ir_description.robot import AXIS_UNITS
 from ir_recorder.errors import RecorderError
 from ir_recorder.fit.channels import FittedRun, by_window
 from ir_recorder.fit.data import DataSource, FitData, fit_data

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from ir_description import PowerParameters, physical_bounds
+from ir_description import PowerParameters
+from ir_description.robot import physical_bounds
 from ir_recorder.errors import RecorderError
 from ir_recorder.fit.channels import (
     FRICTION,

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ir_description import PowerParameters, parameter_unit
+from ir_description import PowerParameters
+from ir_description.robot import parameter_unit
 from ir_recorder.errors import RecorderError
 from ir_recorder.fit.estimate import Fit, FittedMovement
 from ir_recorder.fit.left_out import METHODS, LeftOut

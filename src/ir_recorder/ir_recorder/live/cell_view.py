@@ -14,7 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_description import Cell, DescriptionError, PartPlaces, cell_from_yaml, cell_in
+from ir_description import Cell, DescriptionError, PartPlaces, cell_from_yaml
+from ir_description.cell import cell_in
 from ir_kernels import Chain, CollisionModel
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.trajectory import JointTrajectory

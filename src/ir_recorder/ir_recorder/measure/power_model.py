@@ -8,8 +8,8 @@ from math import exp, log1p
 
 import numpy as np
 
-from ir_description import IDLE, LINK, PowerParameters, RobotModel, centre_directions
-from ir_description.robot import DcLink
+from ir_description import PowerParameters, RobotModel
+from ir_description.robot import IDLE, LINK, DcLink, centre_directions
 from ir_msgs_py.modes import drive_bus_up
 from ir_recorder.errors import RecorderError
 from ir_recorder.measure.arm import ArmTorques, arm_torques, centre_torques

@@ -12,7 +12,8 @@ from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.task import Future
 
-from ir_description import DescriptionError, read_power_parameters
+from ir_description import DescriptionError
+from ir_description.library import read_power_parameters
 from ir_msgs.srv import GetCell
 from ir_msgs_py import names
 from ir_msgs_py.status import StatusCode

@@ -1,6 +1,10 @@
 """Recordings being written, without ROS: the file, and the session that fills it."""
 
-from ir_recorder.recording.session import CellFiles, RecordingSession, files_of_cell
-from ir_recorder.recording.writer import RecordingSummary, RecordingWriter
+from ir_recorder.recording.session import CellFiles, RecordingSession
+from ir_recorder.recording.writer import RecordingWriter
 
-__all__ = ["CellFiles", "RecordingSession", "RecordingSummary", "RecordingWriter", "files_of_cell"]
+__all__ = [
+    "CellFiles",
+    "RecordingSession",
+    "RecordingWriter",
+]

@@ -21,9 +21,9 @@ from ir_description import (
     cell_to_yaml,
     load_cell,
     load_robot_cells,
-    robot_in,
     robot_urdf,
 )
+from ir_description.library import robot_in
 from ir_recorder.errors import LostFileError, RecorderError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import Split, part_facts, part_path

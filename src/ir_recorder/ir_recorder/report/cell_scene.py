@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ir_description import Body, Cell, Equipment, machine_in
+from ir_description import Body, Cell, Equipment
+from ir_description.cell import machine_in
 from ir_recorder.reading.recording import TextEvent
 from ir_recorder.report.series import Json, indices, quantised
 from ir_recorder.report.shapes import Mesh, body_mesh, capsule_mesh, robot_parts

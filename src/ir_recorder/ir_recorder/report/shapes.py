@@ -9,7 +9,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from ir_description import Body, Capsule, RobotModel
+from ir_description import Body, RobotModel
+from ir_description.shapes import Capsule
 from ir_values.arrays import FloatArray, IntArray
 
 # Triangles of bodies and capsules for the picture, with normals.

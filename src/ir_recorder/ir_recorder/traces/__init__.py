@@ -2,7 +2,7 @@
 
 from ir_recorder.traces.columns import TraceMapping, read_mapping
 from ir_recorder.traces.reader import column_names, read_traces
-from ir_recorder.traces.trace import ClockOffset, Trace, clock_offset, mean_power, resampled
+from ir_recorder.traces.trace import ClockOffset, Trace, clock_offset, mean_power
 
 __all__ = [
     "ClockOffset",
@@ -13,5 +13,4 @@ __all__ = [
     "mean_power",
     "read_mapping",
     "read_traces",
-    "resampled",
 ]

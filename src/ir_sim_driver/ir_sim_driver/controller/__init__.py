@@ -2,17 +2,15 @@
 it.
 """
 
-from ir_sim_driver.controller.driver import Driver, Snapshot
-from ir_sim_driver.controller.goal_checks import VettedGoal
-from ir_sim_driver.controller.goals import NO_GOAL, ended_by_stop, refused
-from ir_sim_driver.controller.outputs import Frame, Joints, PartStatus, report
+from ir_sim_driver.controller.driver import Driver
+from ir_sim_driver.controller.goals import ended_by_stop, refused
+from ir_sim_driver.controller.outputs import Frame, Joints, PartStatus
 from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
 from ir_sim_driver.controller.simulation import Simulation, make_simulation
 from ir_sim_driver.controller.supervision import SupervisionSettings
 from ir_sim_driver.controller.surroundings import PlannedCell
 
 __all__ = [
-    "NO_GOAL",
     "ControllerSettings",
     "Driver",
     "Frame",
@@ -21,11 +19,8 @@ __all__ = [
     "PlannedCell",
     "Simulation",
     "SimulationSettings",
-    "Snapshot",
     "SupervisionSettings",
-    "VettedGoal",
     "ended_by_stop",
     "make_simulation",
     "refused",
-    "report",
 ]

@@ -11,16 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ir_description import (
-    AllowedContact,
-    Body,
-    Capsule,
-    Cell,
-    Equipment,
-    PartRoute,
-    cell_in,
-    sweep_speeds,
-)
+from ir_description import Body, Cell, Equipment
+from ir_description.cell import AllowedContact, PartRoute, cell_in, sweep_speeds
+from ir_description.shapes import Capsule
 from ir_kernels.chain import Chain
 from ir_kernels.collision import CollisionModel
 from ir_msgs_py.announcements import MachineState

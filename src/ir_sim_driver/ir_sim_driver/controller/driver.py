@@ -11,7 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_description import Capsule, Cell, FramePose, fixed_frames, moving_frames, robot_urdf
+from ir_description import Cell, robot_urdf
+from ir_description.robot import FramePose, fixed_frames, moving_frames
+from ir_description.shapes import Capsule
 from ir_kernels.chain import Chain
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.announcements import ControllerTimers

@@ -2,7 +2,7 @@
 squares.
 """
 
-from ir_sim_driver.load_check.checks import LoadChecks, LoadCheckSettings, LoadWatch
+from ir_sim_driver.load_check.checks import LoadChecks, LoadCheckSettings
 from ir_sim_driver.load_check.estimate import (
     Declared,
     LoadFinding,
@@ -16,7 +16,6 @@ __all__ = [
     "LoadCheckSettings",
     "LoadChecks",
     "LoadFinding",
-    "LoadWatch",
     "NotedMotion",
     "Uncertainty",
     "weighed",

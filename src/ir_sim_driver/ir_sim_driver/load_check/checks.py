@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_description import DATA_SHEET, Cell, Load, data_sheet_of, load_power_parameters
+from ir_description import Cell, Load, data_sheet_of
+from ir_description.library import load_power_parameters
+from ir_description.robot import DATA_SHEET
 from ir_sim_driver.load_check.estimate import (
     Declared,
     LoadFinding,

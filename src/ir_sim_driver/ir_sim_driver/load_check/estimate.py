@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ir_description import RELATIVE_DEVIATION, Load, PowerParameters, RobotModel
+from ir_description import Load, PowerParameters, RobotModel
+from ir_description.robot import RELATIVE_DEVIATION
 from ir_kernels.dynamics import DynamicsModel
 from ir_sim_driver.plant import Carried
 from ir_values.arrays import FloatArray

@@ -9,7 +9,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from ir_description import LIMIT_TOLERANCE
+from ir_description.robot import LIMIT_TOLERANCE
 from ir_msgs_py.announcements import Contact
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.load_check import LoadFinding

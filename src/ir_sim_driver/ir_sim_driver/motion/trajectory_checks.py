@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ir_description import OUTSIDE_MAX, RobotModel
-from ir_kernels import Extrema, polynomial_extrema
+from ir_description import RobotModel
+from ir_description.robot import OUTSIDE_MAX
 from ir_kernels.dynamics import DynamicsModel
+from ir_kernels.limits import Extrema, polynomial_extrema
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.corner_rounding import SHARES, SLOWEST, is_rounded, rounded

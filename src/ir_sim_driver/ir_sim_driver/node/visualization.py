@@ -13,7 +13,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ir_description import Capsule, FramePose
+from ir_description.robot import FramePose
+from ir_description.shapes import Capsule
 from ir_msgs_py import names
 from ir_msgs_py.ros.conversions import pose_to_msg, time_to_msg
 from ir_sim_driver.controller import Driver

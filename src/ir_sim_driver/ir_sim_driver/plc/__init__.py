@@ -3,11 +3,9 @@ by.
 """
 
 from ir_sim_driver.plc.inputs import (
-    BITS,
     LINKS,
     OFF_BIT,
     OWN_BITS,
-    POWER_BITS,
     SERVICE,
     TOPIC,
     WRITERS,
@@ -22,11 +20,9 @@ from ir_sim_driver.plc.port import STOP_BIT, Controller, Link, OpenLink, Readout
 from ir_sim_driver.plc.wake_listener import WakeOnLan
 
 __all__ = [
-    "BITS",
     "LINKS",
     "OFF_BIT",
     "OWN_BITS",
-    "POWER_BITS",
     "SERVICE",
     "STOP_BIT",
     "TOPIC",

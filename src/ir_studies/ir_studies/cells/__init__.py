@@ -5,7 +5,7 @@ for instance in read_instances("cells.xml"):
     print(answer.energy, answer.gap)
 """
 
-from ir_studies.cells.instance import Instance, Schedule
+from ir_studies.cells.instance import Instance
 from ir_studies.cells.solution import CellAnswer, hurried, solve_cell
 from ir_studies.cells.tended_cell import tended_instance
 from ir_studies.cells.xml_file import read_instances, written
@@ -13,7 +13,6 @@ from ir_studies.cells.xml_file import read_instances, written
 __all__ = [
     "CellAnswer",
     "Instance",
-    "Schedule",
     "hurried",
     "read_instances",
     "solve_cell",

@@ -4,12 +4,11 @@ Time and energy with synchronous and asynchronous joints; predicted, measured di
 indirectly.
 """
 
-from ir_studies.statistics.runs import FinishedStatistics, run_statistics
+from ir_studies.statistics.runs import run_statistics
 from ir_studies.statistics.settings import EXAMPLE, StatisticsSettings, statistics_settings
 
 __all__ = [
     "EXAMPLE",
-    "FinishedStatistics",
     "StatisticsSettings",
     "run_statistics",
     "statistics_settings",

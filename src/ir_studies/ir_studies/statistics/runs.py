@@ -17,8 +17,8 @@ from ir_planner import Goal, MovementPlan, Planner, PlannerError
 from ir_recorder.analysis.indirect import IndirectMeter
 from ir_recorder.reading.recording import JointSeries
 from ir_recorder.traces import Trace
-from ir_sim_driver import DriverError, carried
-from ir_sim_driver.plant import plant_hash, plant_named
+from ir_sim_driver import DriverError
+from ir_sim_driver.plant import carried, plant_hash, plant_named
 from ir_studies.errors import DrivingError, StudyError
 from ir_studies.simulated_run import READING, SimulatedRun
 from ir_studies.statistics.findings import Findings, findings_of, solved

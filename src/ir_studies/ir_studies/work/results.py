@@ -16,7 +16,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from ir_description import Cell, Task
+from ir_description import Cell
+from ir_description.cell import Task
 from ir_studies.errors import FolderError, WorkerError
 from ir_studies.work.fingerprint import computed_with
 from ir_studies.work.job import Job, Row
