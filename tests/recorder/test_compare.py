@@ -88,7 +88,7 @@ def test_power_on_the_common_grid_keeps_the_peaks_of_the_meter(
 def test_steps_that_one_recording_lacks_are_a_dash(analysis: Analysis) -> None:
     short = analyse(replace(analysis.recording, events=analysis.recording.events[:4]))
     steps = page_of(analysis, short).split('id="steps"')[1]
-    assert re.search(r'<td class="n"[^>]*>–</td>', steps)
+    assert re.search(r'<td class="n no"[^>]*>–</td>', steps)
 
 
 def test_names_in_recordings_stay_text(analysis: Analysis) -> None:

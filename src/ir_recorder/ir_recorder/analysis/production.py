@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ir_description import Cell, PowerData
+from ir_description import Cell, PowerData, data_sheet_of
 from ir_description.robot import interval_over
 from ir_msgs_py.modes import REST_MODES
 from ir_msgs_py.names import NO_LOAD
@@ -21,7 +21,12 @@ from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.savings import ProgramSavings, Saving
 from ir_recorder.analysis.flows import EnergyFlows, energy_flows
 from ir_recorder.analysis.loads import carried
-from ir_recorder.analysis.predicted_power import recorded_power_data, resting_watts
+from ir_recorder.analysis.predicted_power import (
+    BRAKES,
+    Predictor,
+    recorded_power_data,
+    resting_watts,
+)
 from ir_recorder.analysis.results import (
     Analysis,
     FullPause,
@@ -38,6 +43,7 @@ ENDED = "ended"  # outcome of a step
 PREDICTED = "predicted"
 PLANNED_MOVING = "MOVING"
 NO_MODE = "STAND_ON_MOTORS"
+HIBERNATION = "HIBERNATION"
 OPEN = "zero lies in it: it is open whether anything is saved"
 DRIVES_ONLY = "drives only, controller not counted"
 
@@ -58,9 +64,9 @@ class Amount:
         """So many of it."""
         return self.of(lambda value: value * count)
 
-    def plus(self, sure: float) -> Amount:
-        """With what has no interval."""
-        return self.of(lambda value: value + sure)
+    def plus(self, other: Amount) -> Amount:
+        """Both, ends added: what is unsure is so in both alike."""
+        return Amount(self.value + other.value, self.low + other.low, self.high + other.high)
 
     @property
     def doubt(self) -> str:
@@ -389,9 +395,42 @@ def idle_watts(analysis: Analysis) -> dict[str, float]:
     if cell is None or not cell.robot.controller.counted:
         return {}
     data, _ = recorded_power_data(analysis.recording, cell)
+    return home_watts(cell, _ends_with(analysis), data)
+
+
+def _ends_with(analysis: Analysis) -> str:
+    """The load that the program ends with."""
     ends = [step.load for step in analysis.recording.planned[-1:]]
     ends += [result.step.movement.load for result in analysis.steps[-1:]]
-    return home_watts(cell, ends[-1] if ends else NO_LOAD, data)
+    return ends[-1] if ends else NO_LOAD
+
+
+def rest_saving(analysis: Analysis) -> Amount | None:
+    """W that hibernation saves over closed brakes at machine home, of the robot of a recording;
+    None where its rest isn't known.
+    """
+    cell = analysis.cell
+    rests = idle_watts(analysis)
+    if cell is None or not rests:
+        return None
+    data, _ = recorded_power_data(analysis.recording, cell)
+    return saved_at_rest(cell, _ends_with(analysis), data)
+
+
+def saved_at_rest(cell: Cell, load: str, data: PowerData) -> Amount:
+    """W that hibernation saves over closed brakes at machine home with a load. Its 90 % interval is
+    over robots drawn from the data sheet; where both were measured there is none.
+    """
+    rests = home_watts(cell, load, data)
+    saved = rests[BRAKES] - rests[HIBERNATION]
+    if all_rests_measured(data):
+        return Amount(saved, saved, saved)
+    robots = Predictor(cell.robot, data.dc_link, cell.base_pose, data_sheet_of(cell.robot, data))
+    brakes, deepest = (
+        robots.added_at_rest(mode, cell.machine_home, carried(cell, load))
+        for mode in (BRAKES, HIBERNATION)
+    )
+    return Amount(saved, *interval_over(saved, brakes - deepest))
 
 
 def rest_measured(analysis: Analysis) -> bool:

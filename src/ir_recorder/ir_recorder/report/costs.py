@@ -14,6 +14,7 @@ from ir_description.files import plain_yaml
 from ir_msgs_py.savings import Saving
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.production import (
+    HIBERNATION,
     Amount,
     Production,
     demand_watts,
@@ -21,6 +22,7 @@ from ir_recorder.analysis.production import (
     levers,
     production_of,
     rest_measured,
+    rest_saving,
     saved_amount,
 )
 from ir_recorder.errors import RecorderError
@@ -587,38 +589,56 @@ def demand_money(peak: float, costs: Costs) -> str:
 
 LEFT_ALONE = "STAND_ON_BRAKES"
 """The mode that a controller goes into by itself while nobody works."""
-_DEEPEST = "HIBERNATION"
 _TODAY = "<small>today: what the controller does if left alone</small>"
 
 
 @dataclass(frozen=True)
 class IdleSaving:
     """Money of a year outside of the shifts: the controller left alone, and in its deepest mode;
-    and the power of both [W], through so many hours. measured: whether both powers were.
+    and the power of both [W], through so many hours, each at a price. saves [W]: the difference
+    with its interval. measured: whether both powers were.
     """
 
     mode: str
-    left_alone: float
-    deepest: float
     watts_left_alone: float
     watts_deepest: float
+    saves: Amount
     hours: float
+    price: float
     measured: bool = False
 
     @property
-    def energy(self) -> float:
+    def energy(self) -> Amount:
         """What the deepest mode saves [J]."""
-        return (self.watts_left_alone - self.watts_deepest) * self.hours * 3600.0
+        return self.saves.times(self.hours * 3600.0)
+
+    @property
+    def money(self) -> Amount:
+        """What the deepest mode saves."""
+        return self.saves.of(self._money)
+
+    @property
+    def left_alone(self) -> float:
+        """Money of the controller left alone."""
+        return self._money(self.watts_left_alone)
+
+    @property
+    def deepest(self) -> float:
+        """Money in the deepest mode."""
+        return self._money(self.watts_deepest)
+
+    def _money(self, watts: float) -> float:
+        return watts * self.hours / 1000.0 * self.price
 
     @property
     def basis(self) -> str:
-        """What the powers rest on, in words; it has no interval."""
+        """What the powers rest on, in words."""
         return "from measured powers" if self.measured else "from the data sheet, not measured"
 
     @property
     def saved(self) -> float:
-        """What the deepest mode saves."""
-        return self.left_alone - self.deepest
+        """What the deepest mode saves, in money."""
+        return self.money.value
 
 
 @dataclass(frozen=True)
@@ -637,29 +657,37 @@ class SavedYear:
 
 
 def saved_year(saved: Amount, idle: IdleSaving | None, costs: Costs) -> SavedYear:
-    """The saving in shifts [J] with that outside of them, which has no interval."""
-    price, energy = (0.0, 0.0) if idle is None else (idle.saved, idle.energy)
-    return SavedYear(saved.of(costs.money).plus(price), saved.plus(energy))
+    """The saving in shifts [J] with that outside of them."""
+    shifts = saved.of(costs.money)
+    if idle is None:
+        return SavedYear(shifts, saved)
+    return SavedYear(shifts.plus(idle.money), saved.plus(idle.energy))
 
 
 def idle_saving(
-    watts_at_rest: Mapping[str, float], costs: Costs, *, measured: bool = False
+    watts_at_rest: Mapping[str, float],
+    saves: Amount | None,
+    costs: Costs,
+    *,
+    measured: bool = False,
 ) -> IdleSaving | None:
     """What hibernation saves outside of the shifts; None where a power of rest [W] is not known, or
-    it saves nothing. measured: whether the powers were.
+    it saves nothing. saves [W]: over closed brakes. measured: whether the powers were.
     """
-    if not {LEFT_ALONE, _DEEPEST} <= set(watts_at_rest) or costs.idle_hours <= 0.0:
+    known = {LEFT_ALONE, HIBERNATION} <= set(watts_at_rest)
+    if not known or saves is None or costs.idle_hours <= 0.0:
         return None
-    alone = watts_at_rest[LEFT_ALONE]
-    rest = watts_at_rest[_DEEPEST]
-    left, deepest = (each * costs.idle_hours / 1000.0 * costs.idle_price for each in (alone, rest))
-    found = IdleSaving(_DEEPEST.lower(), left, deepest, alone, rest, costs.idle_hours, measured)
+    rests = watts_at_rest[LEFT_ALONE], watts_at_rest[HIBERNATION]
+    found = IdleSaving(
+        HIBERNATION.lower(), *rests, saves, costs.idle_hours, costs.idle_price, measured
+    )
     return found if found.saved >= _NOTHING else None
 
 
 def recorded_idle_saving(analysis: Analysis, costs: Costs) -> IdleSaving | None:
     """The same of the robot of a recording, by its data."""
-    return idle_saving(idle_watts(analysis), costs, measured=rest_measured(analysis))
+    measured = rest_measured(analysis)
+    return idle_saving(idle_watts(analysis), rest_saving(analysis), costs, measured=measured)
 
 
 def idle_sentence(found: IdleSaving | None, costs: Costs) -> str:

@@ -23,6 +23,7 @@ from ir_recorder.analysis.production import (
     mean_of,
     production_of,
     rest_measured,
+    rest_saving,
     sum_of,
     without_production,
 )
@@ -175,8 +176,8 @@ class Member:
     """A recording of a robot. robot: the folder that the file lies in, or its own name; cycle: what
     its program takes in production; measures: joules of a cycle that each could save at most;
     demand [W]: of its largest quarter of an hour; idle [W]: at rest by power mode; month: of its
-    start, as "2026-05" (UTC); driven, predicted [J]: of its run, as it was driven; rest_measured:
-    whether powers at rest were.
+    start, as "2026-05" (UTC); driven, predicted [J]: of its run, as it was driven; rest_saves
+    [W]: what hibernation saves over closed brakes; rest_measured: whether powers at rest were.
     """
 
     robot: str
@@ -189,6 +190,7 @@ class Member:
     month: str
     driven: float
     predicted: float
+    rest_saves: Amount | None = None
     rest_measured: bool = False
 
 
@@ -246,6 +248,7 @@ def member_of(analysis: Analysis, robot: str, said: Said = lambda _: None) -> Me
         idle_watts(analysis),
         started(analysis.recording).strftime("%Y-%m"),
         *driven_and_predicted(analysis),
+        rest_saving(analysis),
         rest_measured(analysis),
     )
 
@@ -463,7 +466,7 @@ def _sure_of(paid: Paid, costs: Costs) -> str:
         _, gain = paid.year(costs).money.gain()
         said += [_sure(gain, costs), "What plans save is predicted."]
     if paid.idle is not None:
-        said.append(f"What nights save is {paid.idle.basis}, and counted as sure.")
+        said.append(f"What nights save is {paid.idle.basis}.")
     return " ".join(each for each in said if each)
 
 
@@ -673,7 +676,9 @@ def _idle_saving(members: Sequence[Member], costs: Costs) -> IdleSaving | None:
     modes = set.intersection(*(set(rest) for rest in rests.values())) if rests else set()
     watts_of_all = {mode: sum(rest[mode] for rest in rests.values()) for mode in modes}
     measured = all(member.rest_measured for member in members if member.idle)
-    return idle_saving(watts_of_all, costs, measured=measured)
+    saves = {member.robot: member.rest_saves for member in members}
+    known = [saved for saved in saves.values() if saved is not None]
+    return idle_saving(watts_of_all, sum_of(known), costs, measured=measured)
 
 
 def _rest_head(mode: str) -> str:
@@ -838,7 +843,7 @@ def _night(
     if together is None:
         return []
     own = {robot.name: _idle_saving(_own(members, robot), costs) for robot in robots}
-    energies = {name: idle.energy for name, idle in own.items() if idle is not None}
+    energies = {name: idle.energy.value for name, idle in own.items() if idle is not None}
     basis = f"{together.mode} instead of closed brakes, {together.basis}"
     name = f"at night and at weekends<small>{text(basis)}</small>"
     return [(together.saved, name, energies)]

@@ -131,11 +131,13 @@ class Paid:
         if self.idle is None:
             return None
         found = self.idle
+        between = _between(found.money, costs)
         of = f", {self.robots} robots together" if self.robots > 1 else ""
         return Tile(
             "saved a year at night and at weekends",
             yearly_money(found.saved, costs.currency),
             (
+                between,
                 f"{found.mode} ({found.watts_deepest:.0f} W) instead of closed brakes "
                 f"({found.watts_left_alone:.0f} W){of}",
                 found.basis,
@@ -150,9 +152,7 @@ class Paid:
         price = yearly_money(gain.value, costs.currency)
         today = costs.money(self.common) + self.idle.left_alone
         share = f"{_percent(gain.value, today)} {'less' if word == 'saved' else 'more'}"
-        unsure = _between(gain, costs)
-        sure = "nights counted as sure" if unsure else ""
-        notes = (unsure, sure, share, year.with_energy(costs), payback(year.money, costs))
+        notes = (_between(gain, costs), share, year.with_energy(costs), payback(year.money, costs))
         return Tile(f"{word} a year, both together", price, notes)
 
 

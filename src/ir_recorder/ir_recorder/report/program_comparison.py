@@ -21,6 +21,7 @@ from ir_recorder.analysis.production import (
     home_watts,
     largest_quarter,
     saved_amount,
+    saved_at_rest,
 )
 from ir_recorder.report.cell_scene import cell_scene
 from ir_recorder.report.charts import Point, front_part
@@ -221,8 +222,10 @@ def _idle(found: BeforeAfter, cell: Cell, costs: Costs) -> IdleSaving | None:
     controller = cell.robot.controller
     if not controller.counted:
         return None
-    rests = home_watts(cell, found.planned.movements[-1].load, controller)
-    return idle_saving(rests, costs, measured=all_rests_measured(controller))
+    load = found.planned.movements[-1].load
+    rests = home_watts(cell, load, controller)
+    saves = saved_at_rest(cell, load, controller)
+    return idle_saving(rests, saves, costs, measured=all_rests_measured(controller))
 
 
 def change_table(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
