@@ -7,16 +7,15 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from ir_studies.arena.figures import (
     ArenaRun,
-    Compared,
+    against,
     asked_alike,
     blocked_and_free,
     columns,
-    compared,
     cost_over_time,
-    energy_and_time,
     figures,
     success_over_time,
 )
@@ -82,19 +81,37 @@ def test_what_costs_nothing_is_a_figure_too() -> None:
     ]
     assert (figures("a", runs).cost_ratio, figures("b", runs).movement_ratio) == (1.0, 1.0)
     assert math.isnan(figures("c", runs).cost_ratio)
-    assert compared("a", "b", runs) == Compared(1, 1.0, 0)
-    assert compared("a", "c", runs).lower == 0
+    assert against("a", "b", runs).cost.value == 0.0
+    assert math.isnan(against("a", "c", runs).cost.value)
     assert cost_over_time(("b",), runs, TIME)[-1, 0] == 0.0
 
 
 def test_planners_are_compared_where_both_solved() -> None:
-    assert compared("a", "b", RUNS) == Compared(1, 1.5, 0)
-    assert compared("b", "a", RUNS) == Compared(1, 100.0 / 150.0, 1)
-    assert compared("b", "a", RUNS, tie=0.5) == Compared(1, 100.0 / 150.0, 0)
-    assert compared("a", "a", RUNS) == Compared(2, 1.0, 0)
-    nobody = compared("a", "nobody", RUNS)
-    assert (nobody.both, nobody.lower) == (0, 0)
-    assert math.isnan(nobody.ratio)
+    held = against("a", "b", RUNS)
+    assert (held.both, held.fewer, held.more) == (1, 1, 0)
+    assert held.cost.value == pytest.approx(50.0)
+    assert against("b", "a", RUNS).cost.value == pytest.approx(-100.0 / 3.0)
+    assert against("a", "a", RUNS).cost.value == 0.0
+    nobody = against("a", "nobody", RUNS)
+    assert (nobody.both, nobody.chance) == (0, 1.0)
+    assert math.isnan(nobody.cost.value)
+
+
+def test_seeds_of_one_question_are_no_independent_runs() -> None:
+    """Ten seeds of a question in which b is worse are one question: no difference is shown."""
+    entry = RUNS[0].entry
+    runs = [
+        replace(one, entry=replace(entry, planner=one.entry.planner, seed=seed))
+        for seed in range(10)
+        for one in (RUNS[0], RUNS[2])
+    ]
+    held = against("a", "b", runs)
+    assert held.both == 1
+    assert math.isnan(held.cost.low)
+    unsolved = [
+        replace(one, row={"solved": False}) if one.entry.planner == "b" else one for one in runs
+    ]
+    assert against("a", "b", unsolved).chance == 1.0
 
 
 def test_a_run_that_died_is_listed_with_its_question() -> None:
@@ -121,14 +138,13 @@ def test_the_page_says_by_itself_where_the_portfolio_is_beaten() -> None:
         [*mine, run("sbl", "1", 90.0, 0.1, 0.5), run("sbl", "2", math.nan, 0.0, 0.0)], settings
     )
     assert (
-        "open: cost below the portfolio&#x27;s, in the median of the runs that both solved: sbl "
-        "10.00 % (lower in 1 of 1)" in said
+        "open: cost below the portfolio&#x27;s, in the median of the movements that both solved: "
+        "sbl 10.00 % (1 movement, too few to be sure)" in said
     )
-    assert "solved" not in said.partition("runs that both solved")[2]
+    assert "solved" not in said.partition("movements that both solved")[2]
     same = [run("sbl", task, cost, 0.1, 0.5) for task, cost in (("1", 100.0), ("2", 250.0))]
-    assert "In no cell did anybody solve more than the portfolio" in verdict(
-        [*mine, *same], settings
-    )
+    assert verdict([*mine, *same], settings) == ""
+    assert "In no cell is anybody shown to be ahead" in page_html([*mine, *same], settings)
     more = [run("portfolio", "1", math.nan, 0.0, 0.0), run("sbl", "1", 90.0, 0.1, 0.5)]
     assert "open: sbl solved 1 of 1, the portfolio 0." in verdict(more, settings)
 
@@ -137,7 +153,10 @@ def test_the_page_says_first_who_won_and_what_that_means() -> None:
     settings = ArenaSettings(cells=("open",), planners=("portfolio", "sbl"))
     runs = [run(name, "1", 100.0, 0.1, 0.5) for name in settings.planners]
     page = page_html(runs, settings)
-    assert page.index("The winner is portfolio: it solved 1 of 1 runs") < page.index('class="tile"')
+    answer = page.split('<section id="answer">')[1].partition("</section>")[0]
+    assert "<b>portfolio wins</b>" in answer
+    assert "it solved most, 1 of 1 runs" in answer
+    assert "No difference is shown to sbl" in answer
     assert "in joules: energy of the drives + each robot's own price [W] x seconds" in page
     assert " J above" not in page
     assert "no planner need be named" in page
@@ -155,16 +174,11 @@ def test_free_questions_do_not_hide_where_the_portfolio_is_beaten() -> None:
     ]
     blocked = [run("portfolio", "b", 100.0, 0.1, 0.5), run("sbl", "b", 90.0, 0.1, 0.5)]
     lower = (
-        "cost below the portfolio&#x27;s, in the median of the runs that both solved: sbl 10.00 %"
+        "cost below the portfolio&#x27;s, in the median of the movements that both solved: "
+        "sbl 10.00 %"
     )
     assert f"open: {lower}" in verdict([*free, *blocked], settings)
     cheaper = [
         replace(r, row={**r.row, "cost_j": 45.0}) if r.entry.planner == "sbl" else r for r in free
     ]
     assert f"open, straight movement free: {lower}" in verdict([*cheaper], settings)
-
-
-def test_means_are_of_questions_that_all_solved() -> None:
-    assert energy_and_time(("a", "b"), RUNS) == {"a": (1.0, 100.0), "b": (1.0, 150.0)}
-    assert energy_and_time(("a",), RUNS) == {"a": (1.0, 200.0)}
-    assert energy_and_time(("a",), []) == {}

@@ -11,17 +11,33 @@ from pathlib import Path
 import numpy as np
 
 from ir_recorder.analysis import Analysis, Finding
-from ir_recorder.analysis.production import Production, largest_quarter, production_of
+from ir_recorder.analysis.production import (
+    Production,
+    idle_watts,
+    largest_quarter,
+    production_of,
+    rest_measured,
+)
 from ir_recorder.analysis.results import StepResult
 from ir_recorder.analysis.robots import STAMPS, zone_passes
 from ir_recorder.analysis.tending import Span
-from ir_recorder.report.costs import Costs, assumed_section, yearly_money
+from ir_recorder.report.costs import Costs, assumed_section, idle_saving, money, yearly_money
 from ir_recorder.report.files import write_output
 from ir_recorder.report.gantt import Bar, Gantt, legend, mode_bars, together
-from ir_recorder.report.headline import failing, verdict, yearly_tile
-from ir_recorder.report.number_text import DASH, seconds, text, watt_hours, watts
-from ir_recorder.report.page import PAGE_START, asset
-from ir_recorder.report.paid import Tile
+from ir_recorder.report.headline import checked, failing, source, verdict, yearly_tile
+from ir_recorder.report.methods import counted
+from ir_recorder.report.number_text import (
+    DASH,
+    kilowatt_hours,
+    percent,
+    seconds,
+    text,
+    watt_hours,
+    watts,
+)
+from ir_recorder.report.page import PAGE_START
+from ir_recorder.report.paid import Tile, row_of
+from ir_recorder.report.shell import Answer, shell
 from ir_recorder.report.tables import check_table, table
 from ir_values.files import ANYWHERE, FileRoots
 
@@ -44,49 +60,99 @@ def robots_html(
     first = next(iter(analyses.values()))
     cell = first.cell.name.rpartition(".")[0] if first.cell is not None else ""
     name = cell or first.recording.path.stem
-    title = f"{name}: {len(analyses)} robots"
-    head = (
-        '<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
-    )
-    what = f"{first.recording.origin}, all robots of one recording"
-    return (
-        f'<!doctype html><html lang="en"><head>{head}<title>{text(title)}</title>'
-        f"<style>{asset('page.css')}</style></head><body><header><div><h1>{text(title)}</h1>"
-        f'<p class="subtitle">{text(what)}</p></div>{verdict(checks)}</header><main>'
-        f'<section class="tiles">{_tiles(analyses, prices)}</section>'
-        f"{failing(checks)}"
-        f"<section><h2>Energy and time of the programs</h2>{_table(analyses)}</section>"
-        f"<section><h2>Who moved, waited and passed a zone when</h2>"
-        f"{_figure(analyses)}</section>"
-        f"{assumed_section(prices)}"
-        f'<details class="part" id="checks"><summary><h2>Checks</h2></summary>{check_table(checks)}'
-        "</details></main>"
-        f"<script>{asset('export.js')}\nexportButtons();</script></body></html>"
-    )
-
-
-def _tiles(analyses: Mapping[str, Analysis], costs: Costs) -> str:
-    """What a year costs, then what all robots took together, when, and how long they waited for
-    each other.
-    """
-    every = analyses.values()
-    energy = watt_hours(sum(map(driven_joules, every)))
-    predicted = (
-        f"predicted {watt_hours(sum(map(predicted_joules, every)))}, without waits for signals"
-    )
-    waits = [f"{name} {seconds(sum(waited(a).values()))}" for name, a in analyses.items()]
     cycle = common_cycle(analyses)
-    each = ""
-    if cycle is not None and cycle.cycles > 1.0:
-        each = f"{cycle.cycles:.3g} cycles, {watt_hours(cycle.energy)} each"
-    yearly = [] if cycle is None else [yearly_tile(cycle, costs), _demand(analyses, costs)]
-    shown = (
-        *yearly,
-        Tile("energy of all", energy, (each, predicted)),
+    main = [
+        _answer(analyses, checks, cycle, prices).html(),
+        row_of(_tiles(analyses, cycle, prices)),
+        failing(checks),
+        f"<section><h2>Energy, money and time</h2>{_table(analyses, cycle, prices)}</section>",
+        f"<section><h2>Who moved, waited and passed a zone when</h2>{_figure(analyses)}</section>",
+        assumed_section(prices),
+        '<details class="part" id="checks"><summary><h2>Checks</h2></summary>'
+        f"{check_table(checks)}</details>",
+    ]
+    return shell(
+        f"{name}: {len(analyses)} robots",
+        f"{first.recording.origin}, all robots of one recording",
+        "\n".join(main),
+        badges=[source(first), verdict(checks)],
+    )
+
+
+def _answer(
+    analyses: Mapping[str, Analysis],
+    checks: Sequence[Finding],
+    cycle: Production | None,
+    costs: Costs,
+) -> Answer:
+    """What a year of all costs, how far that is from what was predicted, and what saves of it."""
+    every = analyses.values()
+    driven = sum(map(driven_joules, every))
+    predicted = sum(map(predicted_joules, every))
+    sure = f"{checked(checks)[1].capitalize()}."
+    if predicted > 0.0:
+        sure = (
+            f"One {next(iter(every)).recording.origin} run: {percent(driven / predicted - 1.0)} "
+            f"against the plan, which knows no waits for signals. {sure}"
+        )
+    if cycle is None:
+        words = "No cycle of all robots was driven to its end, or its energy is not known."
+        return Answer("A year is not known", words, sure)
+    year = costs.energy_of_year(cycle).value
+    part = cycle.energy / costs.parts_per_cycle
+    result = f"{yearly_money(costs.money(year), costs.currency)} a year"
+    words = (
+        f"for all robots in shifts: {kilowatt_hours(part)} and "
+        f"{money(costs.money(part), costs.currency)} a part."
+    )
+    return Answer(result, words, sure, _to_do(analyses, cycle, costs))
+
+
+def _to_do(analyses: Mapping[str, Analysis], cycle: Production, costs: Costs) -> str:
+    """What rest outside of the shifts saves, and who waits for the others."""
+    rests = [idle_watts(analysis) for analysis in analyses.values()]
+    modes = set.intersection(*map(set, rests))
+    measured = all(map(rest_measured, analyses.values()))
+    watts_of_all = {mode: sum(rest[mode] for rest in rests) for mode in modes}
+    idle = idle_saving(watts_of_all, costs, measured=measured)
+    said = []
+    if idle is not None:
+        price = yearly_money(idle.saved, costs.currency)
+        said.append(
+            f"Let all go into {idle.mode} at night and at weekends: {price} a year less, "
+            f"{idle.basis}."
+        )
+    waits = {name: sum(waited(a).values()) / cycle.cycles for name, a in analyses.items()}
+    longest = max(waits, key=lambda name: waits[name])
+    if waits[longest] > _LONG_WAIT * cycle.seconds:
+        said.append(
+            f"{longest} waits {seconds(waits[longest])} of each cycle of "
+            f"{seconds(cycle.seconds)}: it may move slower, or take over work."
+        )
+    return " ".join(said)
+
+
+_LONG_WAIT = 0.05  # of a cycle: less is no work worth moving
+
+
+def _tiles(analyses: Mapping[str, Analysis], cycle: Production | None, costs: Costs) -> list[Tile]:
+    """A year, a part, the common peak, and how long they waited for each other."""
+    waits = [f"{name} {seconds(sum(waited(a).values()))}" for name, a in analyses.items()]
+    shown = []
+    if cycle is not None:
+        part = cycle.energy / costs.parts_per_cycle
+        price = money(costs.money(part), costs.currency)
+        made = f"cycle of {seconds(cycle.seconds)}, mean of {cycle.cycles:.3g}"
+        shown = [
+            yearly_tile(cycle, costs),
+            Tile("energy a part", watt_hours(part), (price, made)),
+            _demand(analyses, costs),
+        ]
+    return [
+        *shown,
         Tile("common peak", watts(common_peak(analyses)), ("of a 10 ms reading",)),
         Tile("waited for signals", waits[0], tuple(waits[1:])),
-    )
-    return "".join(tile.html() for tile in shown)
+    ]
 
 
 def _demand(analyses: Mapping[str, Analysis], costs: Costs) -> Tile:
@@ -99,33 +165,50 @@ def _demand(analyses: Mapping[str, Analysis], costs: Costs) -> Tile:
     return Tile("largest quarter of an hour", watts(power), (words, price))
 
 
-def _table(analyses: Mapping[str, Analysis]) -> str:
-    heads = ("robot", ">steps", ">time", ">energy", ">predicted", ">waited for signals", ">peak")
+def _table(analyses: Mapping[str, Analysis], cycle: Production | None, costs: Costs) -> str:
+    """Each robot and all together: what a part takes, and the whole run."""
+    heads = ("robot", ">a part", ">energy", ">predicted", ">time", ">waited for signals", ">peak")
+    every = analyses.values()
+    span = _whole(analyses)
     rows = [
         (
-            f'<a href="{text(robot)}.html">{text(robot)}</a>',
-            str(len(analysis.steps)),
-            seconds(program_span(analysis).seconds),
-            f"<b>{watt_hours(driven_joules(analysis))}</b>",
+            f'<a href="{text(robot)}.html">{text(robot)}</a>'
+            f"<small>{counted(len(analysis.steps), 'step')}</small>",
+            _part(_taken(analysis, span), cycle, costs),
+            watt_hours(driven_joules(analysis)),
             watt_hours(predicted_joules(analysis)),
+            seconds(program_span(analysis).seconds),
             seconds(sum(waited(analysis).values())),
             watts(analysis.peak_power),
         )
         for robot, analysis in analyses.items()
     ]
-    every = analyses.values()
     rows.append(
         (
-            "<b>all together</b>",
-            str(sum(len(analysis.steps) for analysis in every)),
-            seconds(_whole(analyses).seconds),
-            f"<b>{watt_hours(sum(map(driven_joules, every)))}</b>",
+            f"<b>all together</b><small>{sum(len(a.steps) for a in every)} steps</small>",
+            _part(sum(_taken(analysis, span) for analysis in every), cycle, costs),
+            watt_hours(sum(map(driven_joules, every))),
             watt_hours(sum(map(predicted_joules, every))),
+            seconds(span.seconds),
             DASH,
             watts(common_peak(analyses)),
         )
     )
-    return table(heads, rows, "Robots")
+    hint = (
+        "A part: the mean of all cycles, with what a robot takes while it waits for the end of the "
+        "others. Energy, prediction and time are of the whole run, each robot until its own end; "
+        "the peaks of robots come at different times."
+    )
+    return f'{table(heads, rows, "Robots")}<p class="hint">{hint}</p>'
+
+
+def _part(joules: float, cycle: Production | None, costs: Costs) -> str:
+    """Energy and money of a part, of so many joules of the run."""
+    if cycle is None or not np.isfinite(joules):
+        return DASH
+    part = joules / cycle.cycles / costs.parts_per_cycle
+    price = money(costs.money(part), costs.currency)
+    return f"<b>{watt_hours(part)}</b><small>{text(price)}</small>"
 
 
 def program_span(analysis: Analysis) -> Span:

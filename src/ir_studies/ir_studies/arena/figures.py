@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
+from ir_recorder.analysis.intervals import Mean, median_of
 from ir_studies.arena.settings import ArenaEntry
 from ir_studies.work import Row
 from ir_values.arrays import FloatArray
@@ -140,27 +141,59 @@ def figures(planner: str, runs: Sequence[ArenaRun]) -> Figures:
 
 
 @dataclass(frozen=True)
-class Compared:
-    """Runs (a question and a seed each) that both planners solved, the median of the other's J over
-    its own there, and in how many the other's is lower.
+class Against:
+    """Another planner held against one over the questions of both. fewer, more: questions of which
+    it solved fewer, or more, of its seeds; chance: of such an imbalance, or a larger one, between
+    planners that solve alike; both: questions that both solved; cost: there the median of its J
+    above the one's, in percent, with its interval.
     """
 
+    planner: str
+    fewer: int
+    more: int
+    chance: float
     both: int
-    ratio: float
-    lower: int
+    cost: Mean
 
 
-def compared(planner: str, other: str, runs: Sequence[ArenaRun], tie: float = 0.0) -> Compared:
-    """A planner against another one; what differs by less than the share `tie` of J is not
-    lower.
+def against(planner: str, other: str, runs: Sequence[ArenaRun]) -> Against:
+    """Another planner against one. Seeds of a question are no independent runs: a question counts
+    once, by the share of its seeds that was solved and by its median J.
     """
-    a, b = (
-        {(run.entry.question, run.entry.seed): run.number("cost_j") for run in runs
-         if run.solved and run.entry.planner == name}
-        for name in (planner, other)
-    )  # fmt: skip
-    ratios = [_over(b[key], a[key]) for key in a.keys() & b.keys()]
-    return Compared(len(ratios), _median(ratios), sum(ratio < 1.0 - tie for ratio in ratios))
+    mine = _by_question(planner, runs)
+    its = _by_question(other, runs)
+    asked = sorted(mine.keys() & its.keys())
+    shares = np.array([_share(its[one]) - _share(mine[one]) for one in asked])
+    fewer = int((shares < 0.0).sum())
+    more = int((shares > 0.0).sum())
+    both = [one for one in asked if _share(mine[one]) > 0.0 and _share(its[one]) > 0.0]
+    costs = np.array([100.0 * (_over(_cost(its[one]), _cost(mine[one])) - 1.0) for one in both])
+    cost = median_of(costs[np.isfinite(costs)])
+    return Against(other, fewer, more, _sign_chance(fewer, more), len(both), cost)
+
+
+def _by_question(planner: str, runs: Iterable[ArenaRun]) -> dict[Question, list[ArenaRun]]:
+    found: dict[Question, list[ArenaRun]] = {}
+    for run in runs:
+        if run.entry.planner == planner:
+            found.setdefault(run.entry.question, []).append(run)
+    return found
+
+
+def _share(own: Sequence[ArenaRun]) -> float:
+    return sum(run.solved for run in own) / len(own)
+
+
+def _cost(own: Sequence[ArenaRun]) -> float:
+    return _median(run.number("cost_j") for run in own if run.solved)
+
+
+def _sign_chance(fewer: int, more: int) -> float:
+    """Two-sided chance of the sign test; 1 where nothing differs."""
+    from scipy.special import bdtr
+
+    count = fewer + more
+    return min(1.0, 2.0 * float(bdtr(min(fewer, more), count, 0.5))) if count else 1.0
 
 
 def success_over_time(
@@ -185,35 +218,6 @@ def cost_over_time(
         found.append(np.median(np.stack(own), 0) if own else np.full(len(time), np.inf))
     value = 100.0 * (np.stack(found, 1) - 1.0)
     return np.where(np.isfinite(value), value, np.nan)
-
-
-def energy_and_time(
-    planners: Sequence[str], runs: Sequence[ArenaRun]
-) -> dict[str, tuple[float, float]]:
-    """Mean seconds and joules at the mains of each planner over the questions that all of them
-    solved.
-    """
-    by_planner: dict[str, dict[Question, list[ArenaRun]]] = {planner: {} for planner in planners}
-    for run in runs:
-        if run.solved and run.entry.planner in by_planner:
-            by_planner[run.entry.planner].setdefault(run.entry.question, []).append(run)
-    solving = [own for own in by_planner.values() if own]
-    common = set.intersection(*(set(own) for own in solving)) if solving else set()
-    return {
-        planner: (_mean(own, common, "duration_s"), _mean(own, common, "energy_j"))
-        for planner, own in by_planner.items()
-        if own and common
-    }
-
-
-def _mean(
-    own: Mapping[Question, Sequence[ArenaRun]], common: Iterable[Question], name: str
-) -> float:
-    return float(
-        np.mean(
-            [np.mean([run.number(name) for run in own[question]]) for question in sorted(common)]
-        )
-    )
 
 
 def _solved_until(own: Sequence[ArenaRun], time: FloatArray) -> FloatArray:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +16,7 @@ from ir_kernels import Chain
 from ir_msgs_py.options import ROBOTS_TIME_VALUE
 from ir_planner.search import SEARCHES
 from ir_planner.search.with_ompl import needs_ompl
-from ir_recorder.report.bars import Piece, Row, bars
-from ir_recorder.report.charts import Point, front_chart
+from ir_recorder.analysis.intervals import LEVEL, Mean
 from ir_recorder.report.files import write_output
 from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import DASH, joules, millimetres, percent, seconds, text
@@ -26,15 +25,15 @@ from ir_recorder.report.paid import Tile, row_of
 from ir_recorder.report.series import Curves, Json, packed
 from ir_recorder.report.shapes import body_mesh, capsule_mesh
 from ir_recorder.report.shell import Answer
-from ir_recorder.report.tables import table
+from ir_recorder.report.tables import COMPACT, bar, table
 from ir_studies.arena.figures import (
     GRID,
+    Against,
     ArenaRun,
     Figures,
+    against,
     blocked_and_free,
-    compared,
     cost_over_time,
-    energy_and_time,
     figures,
     longest,
     of_cell,
@@ -114,7 +113,8 @@ _HEADS = (
     ">duration", ">energy", ">clearance", ">lost",
 )  # fmt: skip
 _NAMED = 3  # planners, of those that are alike
-_TIE = 5e-5  # of the cost: less is not shown
+_TIE = 1e-3  # of the cost: less is no difference to anybody
+_CHANCE = 1.0 - LEVEL  # a difference that is as likely by chance is not shown
 # percent: what a curve of costs shows where nothing, or something more expensive, is known
 _ABOVE = 25.0
 _BLOCKED = "The straight movement is blocked"
@@ -133,25 +133,24 @@ def write_page(
 def page_html(runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int = 0) -> str:
     """The page as text. missing: runs that were not made yet."""
     titles = _titles(settings.cells)
-    every = [figures(planner, runs) for planner in settings.planners]
     blocked, _ = blocked_and_free(runs)
     shown = blocked or runs
+    ranking = _ranked(shown, settings)
     end = min(longest(shown), settings.seconds)  # what comes after these doesn't count
     head = Head(
-        "Arena",
+        "Arena: planners against each other",
         _subtitle(runs, settings, missing),
-        _answer(every, runs, settings),
-        *_verdict(runs, settings),
+        _answer(ranking, runs, settings),
+        *_verdict(ranking, settings),
     )
     parts = {
         "time_value": _second(settings.time_value),
-        "tiles": _tiles(every),
-        "solved": _solved_bars(every),
+        "tiles": row_of(_tiles(ranking)) if ranking is not None else "",
+        "ranking": _ranking_table(ranking) if ranking is not None else "",
         "verdict": verdict(runs, settings),
-        "shown": "Questions whose straight movement is free are left out: there nothing is "
-        "searched."
+        "shown": "Movements whose straight line is free are left out: there nothing is searched."
         if blocked
-        else "The straight movement is free in every question: nothing was searched.",
+        else "The straight line is free in every movement: nothing was searched.",
         "above": f"{_ABOVE:g}",
         "longest": seconds(longest(runs)),
         "cells": "".join(
@@ -162,11 +161,92 @@ def page_html(runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int = 
         "bindings": text(_bindings(runs, settings.planners)),
         "settings": text(settings_text(settings)),
         "data": json.dumps(
-            {"end": end, "axes": list(_curves(shown, titles, settings.planners, end))},
+            {"end": end, "axes": list(_curves(shown, settings.planners, end))},
             separators=(",", ":"),
         ).replace("<", "\\u003c"),
     }
     return page("arena", head, parts, "\n".join(asset(script) for script in SCRIPTS))
+
+
+@dataclass(frozen=True)
+class _Ranking:
+    """The winner, who solved most and of those costs least; the others against it, in the order of
+    what they solved and cost. found: by planner.
+    """
+
+    winner: str
+    others: tuple[Against, ...]
+    found: Mapping[str, Figures]
+    questions: int
+
+    def best(self, of: Callable[[Figures], float]) -> list[Figures]:
+        """Those that solved as many as the winner, by a figure, the least first."""
+        most = self.found[self.winner].solved
+        return sorted((one for one in self.found.values() if one.solved == most), key=of)
+
+
+def _ranked(runs: Sequence[ArenaRun], settings: ArenaSettings) -> _Ranking | None:
+    """None where no planner solved any run."""
+    every = [figures(planner, runs) for planner in settings.planners]
+    order = sorted(
+        (one for one in every if one.count), key=lambda one: (-one.success, one.cost_ratio)
+    )
+    if not order or not order[0].solved:
+        return None
+    winner = order[0].planner
+    others = tuple(against(winner, one.planner, runs) for one in order[1:])
+    questions = len({run.entry.question for run in runs})
+    return _Ranking(winner, others, {one.planner: one for one in order}, questions)
+
+
+def _differs(other: Against) -> str:
+    """How another planner differs from the winner, where that is shown; "" where it isn't."""
+    if other.chance < _CHANCE and other.fewer != other.more:
+        return "solves fewer" if other.fewer > other.more else "solves more"
+    if other.cost.low > 100.0 * _TIE:
+        return "costs more"
+    if other.cost.high < -100.0 * _TIE:
+        return "costs less where both solve"
+    return ""
+
+
+def _ranking_table(ranking: _Ranking) -> str:
+    """Every planner: what it solved, its cost and its first answer against the winner's."""
+    mine = ranking.found[ranking.winner]
+    rows = [
+        (
+            f"<b>{text(mine.planner)}</b><small>wins</small>",
+            f"<b>{mine.solved}</b> of {mine.count}",
+            bar(mine.success, 1.0, "planned"),
+            DASH,
+            milliseconds(mine.first),
+        )
+    ]
+    for other in ranking.others:
+        own = ranking.found[other.planner]
+        rows.append(
+            (
+                f"{text(own.planner)}<small>{_differs(other) or 'no difference shown'}</small>",
+                f"<b>{own.solved}</b> of {own.count}",
+                bar(own.success, 1.0, ""),
+                _with_ends(other.cost),
+                milliseconds(own.first),
+            )
+        )
+    against_it = f">cost against {ranking.winner}"
+    heads = ("planner", ">solved", "", against_it, ">first answer")
+    return table(heads, rows, "Who wins", COMPACT)
+
+
+def _with_ends(found: Mean) -> str:
+    """A difference in percent with its interval."""
+    if not math.isfinite(found.value):
+        return DASH
+    ends = ""
+    if math.isfinite(found.low):
+        low = percent(found.low / 100.0).removesuffix(" %")
+        ends = f"<small>{low} to {percent(found.high / 100.0)}</small>"
+    return f"{percent(found.value / 100.0)}{ends}"
 
 
 def _subtitle(runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int) -> str:
@@ -185,26 +265,50 @@ def _second(time_value: float) -> str:
     return "each robot's own price [W]" if time_value == ROBOTS_TIME_VALUE else f"{time_value:g} W"
 
 
-def _answer(found: Sequence[Figures], runs: Sequence[ArenaRun], settings: ArenaSettings) -> Answer:
-    """What was asked, who won, and what that means for the choice of a planner."""
-    known = [one for one in found if one.solved]
-    if not known:
-        return Answer("No planner solved any run.", "")
-    asked = len({run.entry.question for run in runs})
-    best = max(known, key=lambda one: (one.success, -one.cost_ratio))
-    above = 100.0 * (best.cost_ratio - 1.0)
-    said = (
-        f"{counted(len(found), 'planner')} had {settings.seconds:g} s of processor for each of "
-        f"{counted(asked, 'movement')} between two places. The winner is {best.planner}: it "
-        f"solved {best.solved} of {best.count} runs, and of those that solved most its "
-        f"trajectories cost least, in the median {above:.2f} % above the best known."
+def _answer(ranking: _Ranking | None, runs: Sequence[ArenaRun], settings: ArenaSettings) -> Answer:
+    """Who won, how sure that is, and what it means for the choice of a planner."""
+    if ranking is None:
+        return Answer("Nobody wins", "No planner solved any run.")
+    best = ranking.found[ranking.winner]
+    words = (
+        f"Of {counted(len(settings.planners), 'planner')} with {settings.seconds:g} s of processor "
+        f"for each of {counted(ranking.questions, 'movement')} it solved most, {best.solved} of "
+        f"{best.count} runs, and of those that solved as many its trajectories cost least, "
+        f"{100.0 * (best.cost_ratio - 1.0):.2f} % above the best known in the median."
     )
+    return Answer(
+        f"{best.planner} wins",
+        words,
+        _sure(ranking, runs, settings),
+        _to_do(ranking, runs, settings),
+    )
+
+
+def _sure(ranking: _Ranking, runs: Sequence[ArenaRun], settings: ArenaSettings) -> str:
+    """Which others are shown to be worse, and which are not."""
+    if not ranking.others:
+        return "There is nobody to compare with."
+    alike = [other.planner for other in ranking.others if not _differs(other)]
+    count = len(ranking.others) - len(alike)
+    said = f"{count} of the {len(ranking.others)} others are shown to differ from it, at 90 %."
+    if alike:
+        said += f" No difference is shown to {', '.join(alike)}."
+    if _judged(settings) and not behind(runs, settings):
+        said += f" In no cell is anybody shown to be ahead of the {PORTFOLIO}."
+    return said
+
+
+def _to_do(ranking: _Ranking, runs: Sequence[ArenaRun], settings: ArenaSettings) -> str:
     if not _judged(settings):
-        return Answer(said, "")
-    means = f"In cells like these {best.planner} may be named instead of the default, {PORTFOLIO}."
-    if best.planner == PORTFOLIO:
-        means = "It is the default: in cells like these no planner need be named."
-    return Answer(f"{said} {means}", "")
+        return ""
+    if ranking.winner != PORTFOLIO:
+        return (
+            f"In cells like these {ranking.winner} may be named instead of the default, "
+            f"{PORTFOLIO}."
+        )
+    ahead = len(behind(runs, settings))
+    but = f", but see {counted(ahead, 'exception')} below" if ahead else ""
+    return f"It is the default: in cells like these no planner need be named{but}."
 
 
 def _bindings(runs: Sequence[ArenaRun], planners: Sequence[str]) -> str:
@@ -257,75 +361,75 @@ def _judged(settings: ArenaSettings) -> bool:
     return PORTFOLIO in settings.planners and len(settings.planners) > 1
 
 
-def _verdict(runs: Sequence[ArenaRun], settings: ArenaSettings) -> tuple[str, bool]:
-    if not _judged(settings):
+def _verdict(ranking: _Ranking | None, settings: ArenaSettings) -> tuple[str, bool]:
+    """The badge: whether the default wins."""
+    if ranking is None or not _judged(settings):
         return "", False
-    if behind(runs, settings):
-        return "The portfolio is not ahead everywhere", False
-    return "Nobody is ahead of the portfolio", True
+    if ranking.winner == PORTFOLIO:
+        return "The default wins", True
+    return f"{ranking.winner} is ahead of the default", False
 
 
 def verdict(runs: Sequence[ArenaRun], settings: ArenaSettings) -> str:
-    """Whether nobody solved more and cost less than the portfolio in any cell, or where not."""
+    """Where somebody solved more than the portfolio or costs less, as a section; "" where nobody
+    is to be named.
+    """
     if not _judged(settings):
         return ""
-    whole = all(of_cell(runs, cell) for cell in settings.cells)
-    place = "In no cell" if whole else "In no cell that has runs"
-    held = (
-        f"{place} did anybody solve more than the portfolio, or have a lower median cost where "
-        "both solved."
-    )
-    items = "".join(f"<li>{text(words)}</li>" for words in behind(runs, settings) or [held])
-    return (
-        f'<section id="verdict"><h2>The portfolio against the others</h2><ul>{items}</ul></section>'
-    )
+    items = "".join(f"<li>{text(words)}</li>" for words in behind(runs, settings))
+    head = f"Where another one is ahead of the {PORTFOLIO}"
+    return f'<section id="verdict"><h2>{head}</h2><ul>{items}</ul></section>' if items else ""
 
 
-def _solved_bars(found: Sequence[Figures]) -> str:
-    """Who solved how many runs, most first, with the time and cost of its answers."""
-    rows = [
-        Row(
-            one.planner,
-            (Piece("planned" if one.planner == PORTFOLIO else "today", "solved", one.success),),
-            f"{one.solved} of {one.count}",
-            (
-                f"first answer {milliseconds(one.first)}",
-                f"cost {percent(one.cost_ratio - 1.0)} above the best",
-            ),
-        )
-        for one in sorted(found, key=lambda one: (-one.solved, one.cost_ratio))
-        if one.count
-    ]
-    return bars(rows, "runs that were solved") if rows else ""
-
-
-def _tiles(found: Sequence[Figures]) -> str:
-    """The planner that solved most, the soonest and the cheapest of those that solved as many."""
-    known = [one for one in found if one.solved]
-    if not known:
-        return ""
-    most = max(one.success for one in known)
-    best = [one for one in known if one.success == most]
-    soonest = min(best, key=lambda one: one.first)
-    cheapest = min(best, key=lambda one: one.cost_ratio)
-    names = ", ".join(one.planner for one in best[:_NAMED])
-    more = f" and {len(best) - _NAMED} more" if len(best) > _NAMED else ""
+def _tiles(ranking: _Ranking) -> list[Tile]:
+    """Who wins at what: most solved, least cost and soonest answer, each with who comes next."""
+    winner = ranking.found[ranking.winner]
+    best = ranking.best(lambda one: one.cost_ratio)
+    soonest = ranking.best(lambda one: one.first)
+    fewer = [one for one in ranking.found.values() if one.solved < winner.solved]
+    after = max(fewer, key=lambda one: one.solved, default=None)
     among = "of those that solved most"
-    tiles = (
-        Tile("most runs solved", f"{best[0].solved} of {best[0].count}", (f"{names}{more}",)),
-        Tile("soonest first answer", milliseconds(soonest.first), (soonest.planner, among)),
+    return [
         Tile(
-            "least cost above the best",
-            percent(cheapest.cost_ratio - 1.0),
-            (cheapest.planner, among),
+            "solved most",
+            _names(best),
+            (
+                f"{winner.solved} of {winner.count} runs",
+                f"next: {after.planner}, {after.solved}" if after is not None else "all alike",
+            ),
         ),
-        Tile("least clearance", millimetres(min(one.clearance for one in known)), ("of all runs",)),
-    )
-    return row_of(tiles)
+        Tile(
+            f"least cost, {among}",
+            best[0].planner,
+            (
+                f"{percent(best[0].cost_ratio - 1.0)} against the best known, median",
+                f"next: {best[1].planner}, {percent(best[1].cost_ratio - 1.0)}"
+                if len(best) > 1
+                else "",
+            ),
+        ),
+        Tile(
+            f"soonest first answer, {among}",
+            soonest[0].planner,
+            (
+                f"{milliseconds(soonest[0].first)}, median",
+                f"next: {soonest[1].planner}, {milliseconds(soonest[1].first)}"
+                if len(soonest) > 1
+                else "",
+            ),
+        ),
+    ]
+
+
+def _names(found: Sequence[Figures]) -> str:
+    more = f" and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
+    return f"{', '.join(one.planner for one in found[:_NAMED])}{more}"
 
 
 def _against(own: Sequence[ArenaRun], place: str, settings: ArenaSettings) -> Iterator[str]:
-    """Who solved more than the portfolio, and all whose cost is lower in one sentence."""
+    """Who solved more than the portfolio, and all whose cost is lower in one sentence, unless the
+    interval of the difference holds none.
+    """
     found = {planner: figures(planner, own) for planner in settings.planners}
     mine = found[PORTFOLIO]
     lower = []
@@ -335,21 +439,28 @@ def _against(own: Sequence[ArenaRun], place: str, settings: ArenaSettings) -> It
                 f"{place}: {planner} solved {other.solved} of {other.count}, the portfolio "
                 f"{mine.solved}."
             )
-        against = compared(PORTFOLIO, planner, own, _TIE)
-        if against.ratio < 1.0 - _TIE:
-            less = f"{100.0 * (1.0 - against.ratio):.2f} %"
-            lower.append(f"{planner} {less} (lower in {against.lower} of {against.both})")
+        held = against(PORTFOLIO, planner, own)
+        if held.cost.value < -100.0 * _TIE and not held.cost.high > 0.0:
+            lower.append(f"{planner} {_less(held)}")
     if lower:
         yield (
-            f"{place}: cost below the portfolio's, in the median of the runs that both solved: "
-            f"{', '.join(lower)}."
+            f"{place}: cost below the portfolio's, in the median of the movements that both "
+            f"solved: {', '.join(lower)}."
         )
+
+
+def _less(held: Against) -> str:
+    """By how much a planner costs less, and how sure that is."""
+    less = f"{-held.cost.value:.2f} %"
+    if not math.isfinite(held.cost.low):
+        return f"{less} ({counted(held.both, 'movement')}, too few to be sure)"
+    return f"{less} (90 % interval {-held.cost.high:.2f} to {-held.cost.low:.2f} %)"
 
 
 def _cell_section(
     runs: Sequence[ArenaRun], name: str, titles: Mapping[str, str], planners: Sequence[str]
 ) -> str:
-    """Picture, figures of blocked and of free pairs apart, and time against energy."""
+    """Picture, and figures of blocked and of free pairs apart."""
     cell = load_cell(name)
     title = titles[name]
     blocked, free = blocked_and_free(of_cell(runs, name))
@@ -359,23 +470,9 @@ def _cell_section(
         if part:
             rows = [_row(figures(planner, part)) for planner in planners]
             parts.append(f"<h3>{head}</h3>{table(_HEADS, rows, f'{title}: {head.lower()}')}")
-    means = energy_and_time(planners, blocked or free)
-    drawn = front_chart(
-        [Point(planner, *means[planner], "measured") for planner in means], "duration"
-    )
-    if drawn:
-        drawn = f'<div><h3>Time against energy</h3><p class="hint">{_FRONT_HINT}</p>{drawn}</div>'
-    parts.insert(0, f'<div class="seen">{picture}{drawn}</div>')
-    key = f"{list(titles).index(name) + 1}_{re.sub(r'[^a-z0-9]+', '_', title.lower())}"
-    shown = "".join(parts).replace('id="energy_over_cycle_time"', f'id="energy_{key}"')
+    shown = picture + "".join(parts)
     head = f"<summary><h2>{text(title)}</h2></summary>"
-    return f'<details class="part paper">{head}{shown}</details>'
-
-
-_FRONT_HINT = (
-    "Means over the questions (blocked ones where there are any) that all planners solved which "
-    "solved any; the line joins those that no other one beats in both."
-)
+    return f'<details class="part">{head}{shown}</details>'
 
 
 def _row(found: Figures) -> tuple[str, ...]:
@@ -399,24 +496,18 @@ def milliseconds(value: float) -> str:
 
 
 def _curves(
-    runs: Sequence[ArenaRun], titles: Mapping[str, str], planners: Sequence[str], end: float
+    runs: Sequence[ArenaRun], planners: Sequence[str], end: float
 ) -> Iterator[dict[str, Json]]:
-    """Success and cost over time until `end` s, for all cells together and for each."""
+    """Success and cost over time until `end` s, of all cells together."""
     time = np.linspace(0.0, end, GRID)
-    places = [
-        ("all cells", list(runs)),
-        *((title, of_cell(runs, cell)) for cell, title in titles.items()),
-    ]
     kinds: tuple[tuple[str, Callable[..., FloatArray], float, float], ...] = (
         ("solved", success_over_time, 100.0, 0.0),
         ("cost above the best known, median", cost_over_time, _ABOVE, _ABOVE),
     )
     for name, compute, most, missing in kinds:
-        for place, own in places if len(titles) > 1 else places[:1]:
-            value = np.nan_to_num(np.minimum(compute(planners, own, time), most), nan=missing)
-            curves = Curves(f"{name}, {place}", "%", time, value, shown=place == "all cells")
-            yield {
-                **packed(curves),
-                "names": list(planners),
-                "ends": [float(time[-1])] * len(planners),
-            }
+        value = np.nan_to_num(np.minimum(compute(planners, runs, time), most), nan=missing)
+        yield {
+            **packed(Curves(name, "%", time, value, shown=True)),
+            "names": list(planners),
+            "ends": [float(time[-1])] * len(planners),
+        }
