@@ -252,6 +252,27 @@ def test_several_robots_are_sums_of_each(walked: Analysis) -> None:
         assert figure.shows(value), (figure, value)
 
 
+def test_a_program_of_several_cycles_costs_by_its_cycles(walked: Analysis) -> None:
+    """Three cycles in one program were one, and a part took three times its energy."""
+    facts = (*walked.recording.facts, ("cycles", "3"))
+    whole = replace(walked, program=replace(walked.program, unshortened=None))
+    made = replace(whole, recording=replace(whole.recording, facts=facts))
+    once = production_of(whole)
+    thrice = production_of(made)
+    assert once is not None
+    assert thrice is not None
+    assert (thrice.cycles, thrice.energy) == (3.0, pytest.approx(once.energy / 3.0))
+    costs = Costs()
+    assert costs.energy_of_year(thrice).value == pytest.approx(costs.energy_of_year(once).value)
+    both = {"left": made, "right": made}
+    cycle = common_cycle(both)
+    assert cycle is not None
+    found = READ.figures_of(robots_html(both, findings(made)))
+    (part,) = READ.called(found, "energy a part")
+    assert part.shows(cycle.energy)
+    assert cycle.energy == pytest.approx(2.0 * driven_joules(made) / 3.0)
+
+
 def test_of_a_route_a_cycle_is_that_of_a_part(
     walked: Analysis, tended: Callable[[Analysis], Analysis]
 ) -> None:

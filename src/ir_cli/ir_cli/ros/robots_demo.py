@@ -173,6 +173,7 @@ class RobotsDemonstration:
             f"seed={self._seed}",
             f"plant={self._plant}",
             f"{contents.SAFETY_DISTANCE}={PlanOptions().safety_distance:g} m",
+            f"{contents.CYCLES}={self._tended.cycles}",
         ]
         topics = [f"/{robot}/*" for robot in plan.robots]
         recorder = {

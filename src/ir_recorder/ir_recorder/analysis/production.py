@@ -36,6 +36,7 @@ from ir_recorder.analysis.results import (
     mode_name,
 )
 from ir_recorder.analysis.steps import step_label
+from ir_recorder.format import contents
 from ir_recorder.reading.recording import Recording
 from ir_values.arrays import FloatArray
 
@@ -208,12 +209,13 @@ def _driven(analysis: Analysis, program: ProgramTotals) -> Production | None:
     """The mean cycle of what was driven; of a route that is the cycle of a part."""
     steps = analysis.steps
     ended = sum(result.step.outcome == ENDED for result in steps)
-    cycles = ended / max(steps[0].step.total, 1)
+    programs = ended / max(steps[0].step.total, 1)
+    cycles = programs * _cycles_of_program(analysis.recording)
     whole = program.whole
-    if cycles < 1.0 or not math.isfinite(whole.energy) or whole.seconds <= 0.0:
+    if programs < 1.0 or not math.isfinite(whole.energy) or whole.seconds <= 0.0:
         return None
     notes = []
-    if cycles != round(cycles):
+    if programs != round(programs):
         notes.append(
             f"its last cycle was not driven to the end ({_ended(analysis)}): it counts as "
             f"{cycles % 1.0:.2f} of one"
@@ -245,6 +247,12 @@ def _driven(analysis: Analysis, program: ProgramTotals) -> Production | None:
         _full_savings(analysis.savings, full),
         tuple(notes),
     )
+
+
+def _cycles_of_program(recording: Recording) -> int:
+    """Whole cycles that a program of several is made of; 1 where the recording doesn't say it."""
+    said = recording.fact(contents.CYCLES)
+    return int(said) if said.isdecimal() and int(said) > 0 else 1
 
 
 def _modes(

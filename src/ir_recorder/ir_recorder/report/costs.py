@@ -371,6 +371,11 @@ def money(value: float, currency: str) -> str:
     return f"{shown} {currency}"
 
 
+def money_of_thousand(energy: float, costs: Costs) -> str:
+    """What a thousand parts of so many joules cost: one costs too little to be read."""
+    return f"{money(1000.0 * costs.money(energy), costs.currency)} for 1 000"
+
+
 _NO_CENTS = 10.0  # of a currency: no cents from here on
 _NOTHING = 0.01  # of a currency, a year: nobody counts less
 _UNSEEN = 1e-4  # of a currency, a part or a shift

@@ -41,7 +41,7 @@ from ir_recorder.report.costs import (
     idle_money,
     idle_saving,
     idle_sentence,
-    money,
+    money_of_thousand,
     small_span,
     yearly_money,
     yearly_span,
@@ -591,9 +591,8 @@ def _robot_row(robot: Robot, members: Sequence[Member], costs: Costs) -> tuple[s
         + (f"<small>{DRIVES_ONLY}</small>" if robot.drives_only else ""),
         *_yearly(robot.yearly, costs),
         _saved(robot.saved, costs),
-        DASH if idle is None else f"<b>{text(yearly_money(idle.saved, costs.currency))}</b>",
-        f"{text(kilowatt_hours(part))}<small>"
-        f"{text(money(costs.money(part), costs.currency))}</small>",
+        DASH if idle is None else _money(idle.money, costs),
+        f"{text(kilowatt_hours(part))}<small>{text(money_of_thousand(part, costs))}</small>",
         text(_first_lever(robot, own, idle, costs)),
     )
 
@@ -617,11 +616,11 @@ def _sums(robots: Sequence[Robot], members: Sequence[Member], costs: Costs) -> t
     """Costs, energy and savings of several robots."""
     saved = [robot.saved for robot in robots if robot.saved is not None]
     nights = [_idle_saving(_own(members, robot), costs) for robot in robots]
-    night = sum(idle.saved for idle in nights if idle is not None)
+    night = [idle.money for idle in nights if idle is not None]
     return (
         *_yearly(sum_of([robot.yearly for robot in robots]), costs),
         _saved(sum_of(saved) if saved else None, costs),
-        f"<b>{text(yearly_money(night, costs.currency))}</b>" if night > 0.0 else DASH,
+        _money(sum_of(night), costs) if night else DASH,
     )
 
 
@@ -747,16 +746,20 @@ def _shown(name: str) -> str:
 
 def _yearly(amount: Amount, costs: Costs) -> tuple[str, str]:
     """Price of a year, and its energy, each with its interval."""
-    price = amount.of(costs.money)
-    between = ""
-    if price.low < price.high:
-        between = (
-            f"<small>{text(yearly_span(price.low, price.high))} {text(costs.currency)}</small>"
-        )
     return (
-        f"<b>{text(yearly_money(price.value, costs.currency))}</b>{between}",
+        _money(amount.of(costs.money), costs),
         f"<b>{text(kilowatt_hours(amount.value))}</b>{small_span(amount, kilowatt_hours)}",
     )
+
+
+def _money(price: Amount, costs: Costs) -> str:
+    return f"<b>{text(yearly_money(price.value, costs.currency))}</b>{_small_ends(price, costs)}"
+
+
+def _small_ends(price: Amount, costs: Costs) -> str:
+    if price.low >= price.high:
+        return ""
+    return f"<small>{text(yearly_span(price.low, price.high))} {text(costs.currency)}</small>"
 
 
 def _saved(amount: Amount | None, costs: Costs) -> str:
@@ -764,18 +767,12 @@ def _saved(amount: Amount | None, costs: Costs) -> str:
     if amount is None:
         return DASH
     word, amount = amount.gain()
-    between = ""
-    if amount.high > amount.low:
-        between = f"<small>{text(_money_between(amount, costs))} {text(costs.currency)}</small>"
+    between = _small_ends(amount.of(costs.money), costs)
     if amount.doubt:
         return f'<span title="{text(amount.doubt)}">open</span>{between}'
     price = yearly_money(costs.money(amount.value), costs.currency)
     energy = f"{kilowatt_hours(amount.value)}{' more' if word == 'more' else ''}"
     return f"<b>{text(price)}</b><small>{text(energy)}</small>{between}"
-
-
-def _money_between(amount: Amount, costs: Costs) -> str:
-    return yearly_span(costs.money(amount.low), costs.money(amount.high))
 
 
 def _matrix(what: str, found: Mapping[str, Mapping[str, float]], robots: Sequence[Robot]) -> str:

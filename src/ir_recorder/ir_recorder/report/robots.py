@@ -12,16 +12,27 @@ import numpy as np
 
 from ir_recorder.analysis import Analysis, Finding
 from ir_recorder.analysis.production import (
+    Amount,
     Production,
     idle_watts,
     largest_quarter,
     production_of,
     rest_measured,
+    rest_saving,
+    sum_of,
 )
 from ir_recorder.analysis.results import StepResult
 from ir_recorder.analysis.robots import STAMPS, zone_passes
 from ir_recorder.analysis.tending import Span
-from ir_recorder.report.costs import Costs, assumed_section, idle_saving, money, yearly_money
+from ir_recorder.report.costs import (
+    Costs,
+    IdleSaving,
+    assumed_section,
+    idle_saving,
+    money_of_thousand,
+    yearly_money,
+    yearly_span,
+)
 from ir_recorder.report.files import write_output
 from ir_recorder.report.gantt import Bar, Gantt, legend, mode_bars, together
 from ir_recorder.report.headline import checked, failing, source, verdict, yearly_tile
@@ -102,34 +113,49 @@ def _answer(
     part = cycle.energy / costs.parts_per_cycle
     result = f"{yearly_money(costs.money(year), costs.currency)} a year"
     words = (
-        f"for all robots in shifts: {kilowatt_hours(part)} and "
-        f"{money(costs.money(part), costs.currency)} a part."
+        f"for all robots in shifts. A part takes {kilowatt_hours(part)}, "
+        f"{money_of_thousand(part, costs)}."
     )
     return Answer(result, words, sure, _to_do(analyses, cycle, costs))
 
 
 def _to_do(analyses: Mapping[str, Analysis], cycle: Production, costs: Costs) -> str:
     """What rest outside of the shifts saves, and who waits for the others."""
-    rests = [idle_watts(analysis) for analysis in analyses.values()]
-    modes = set.intersection(*map(set, rests))
-    measured = all(map(rest_measured, analyses.values()))
-    watts_of_all = {mode: sum(rest[mode] for rest in rests) for mode in modes}
-    idle = idle_saving(watts_of_all, costs, measured=measured)
+    idle = _idle_of_all(analyses, costs)
     said = []
     if idle is not None:
         price = yearly_money(idle.saved, costs.currency)
         said.append(
-            f"Let all go into {idle.mode} at night and at weekends: {price} a year less, "
-            f"{idle.basis}."
+            f"Let all go into {idle.mode} at night and at weekends: {price} a year less"
+            f"{_ends(idle.money, costs)}, {idle.basis}."
         )
     waits = {name: sum(waited(a).values()) / cycle.cycles for name, a in analyses.items()}
     longest = max(waits, key=lambda name: waits[name])
     if waits[longest] > _LONG_WAIT * cycle.seconds:
         said.append(
-            f"{longest} waits {seconds(waits[longest])} of each cycle of "
-            f"{seconds(cycle.seconds)}: it may move slower, or take over work."
+            f"Of each cycle of {seconds(cycle.seconds)} {longest} waits "
+            f"{seconds(waits[longest])} for signals: it may move slower, or take over work."
         )
     return " ".join(said)
+
+
+def _idle_of_all(analyses: Mapping[str, Analysis], costs: Costs) -> IdleSaving | None:
+    """What hibernation of all saves outside of the shifts; None where it is not known of one."""
+    every = list(analyses.values())
+    rests = [idle_watts(analysis) for analysis in every]
+    saves = [saved for analysis in every if (saved := rest_saving(analysis)) is not None]
+    if len(saves) < len(every):
+        return None
+    watts_of_all = {mode: sum(rest[mode] for rest in rests) for mode in rests[0]}
+    measured = all(map(rest_measured, every))
+    return idle_saving(watts_of_all, sum_of(saves), costs, measured=measured)
+
+
+def _ends(price: Amount, costs: Costs) -> str:
+    """The 90 % interval of an amount of a year in brackets; "" without one."""
+    if price.low >= price.high:
+        return ""
+    return f" (90 % interval {yearly_span(price.low, price.high)} {costs.currency})"
 
 
 _LONG_WAIT = 0.05  # of a cycle: less is no work worth moving
@@ -137,12 +163,13 @@ _LONG_WAIT = 0.05  # of a cycle: less is no work worth moving
 
 def _tiles(analyses: Mapping[str, Analysis], cycle: Production | None, costs: Costs) -> list[Tile]:
     """A year, a part, the common peak, and how long they waited for each other."""
-    waits = [f"{name} {seconds(sum(waited(a).values()))}" for name, a in analyses.items()]
+    cycles = cycle.cycles if cycle is not None else 1.0
+    waits = [f"{name} {seconds(sum(waited(a).values()) / cycles)}" for name, a in analyses.items()]
     shown = []
     if cycle is not None:
         part = cycle.energy / costs.parts_per_cycle
-        price = money(costs.money(part), costs.currency)
-        made = f"cycle of {seconds(cycle.seconds)}, mean of {cycle.cycles:.3g}"
+        price = money_of_thousand(part, costs)
+        made = f"mean of {counted(round(cycles), 'cycle')} of {seconds(cycle.seconds)}"
         shown = [
             yearly_tile(cycle, costs),
             Tile("energy a part", watt_hours(part), (price, made)),
@@ -151,7 +178,7 @@ def _tiles(analyses: Mapping[str, Analysis], cycle: Production | None, costs: Co
     return [
         *shown,
         Tile("common peak", watts(common_peak(analyses)), ("of a 10 ms reading",)),
-        Tile("waited for signals", waits[0], tuple(waits[1:])),
+        Tile("waited for signals, a cycle", waits[0], tuple(waits[1:])),
     ]
 
 
@@ -207,8 +234,7 @@ def _part(joules: float, cycle: Production | None, costs: Costs) -> str:
     if cycle is None or not np.isfinite(joules):
         return DASH
     part = joules / cycle.cycles / costs.parts_per_cycle
-    price = money(costs.money(part), costs.currency)
-    return f"<b>{watt_hours(part)}</b><small>{text(price)}</small>"
+    return f"<b>{watt_hours(part)}</b><small>{text(money_of_thousand(part, costs))}</small>"
 
 
 def program_span(analysis: Analysis) -> Span:
