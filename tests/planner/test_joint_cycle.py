@@ -10,12 +10,11 @@ from itertools import product
 import numpy as np
 import pytest
 
-from ir_planner.cycle import (
+from ir_planner.cycle import Curve, WaitMode
+from ir_planner.robots.joint_cycle import (
     ArmWork,
-    Curve,
     ExclusiveZone,
     JointCycle,
-    WaitMode,
     ZoneStretch,
     cheapest_joint,
     shortest_joint,

@@ -25,8 +25,7 @@ from ir_kernels.dynamics_data import (
 from ir_kernels.errors import InputError
 from ir_kernels.limits import segments
 from ir_kernels.reference import dynamics as reference
-from ir_kernels.reference import enclosures as bounds_reference
-from ir_kernels.reference import enclosures as power_reference
+from ir_kernels.reference import enclosures
 from ir_values.arrays import FloatArray
 
 # What the axes take from the DC bus at most, between samples too.
@@ -257,7 +256,7 @@ class DynamicsModel:
             raise InputError(f"tolerance is {tolerance}: it has to be above 0")
         if self._core is None:
             return torque_bounds(
-                *bounds_reference.torque_bounds(self.data, c, T, tolerance, max_intervals)
+                *enclosures.torque_bounds(self.data, c, T, tolerance, max_intervals)
             )
         return torque_bounds(*self._core.torque_bounds(c, T, tolerance, max_intervals))
 
@@ -274,7 +273,7 @@ class DynamicsModel:
         if not longest > 0.0:
             raise InputError(f"longest is {longest} s: it has to be above 0")
         if self._core is None:
-            return power_bounds(*power_reference.power_bounds(self.data, c, T, longest))
+            return power_bounds(*enclosures.power_bounds(self.data, c, T, longest))
         return power_bounds(*self._core.power_bounds(c, T, longest))
 
     def _motion(

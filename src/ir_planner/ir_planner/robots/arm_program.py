@@ -15,7 +15,7 @@ from ir_msgs_py.plc import Signal
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import clearance_violation
-from ir_planner.cycle import ArmSchedule, ArmWork, Lag, ModeWait
+from ir_planner.cycle import ModeWait
 from ir_planner.errors import RequestError
 from ir_planner.flexible import RUNGS, MovementColumn, slowed_down, wait_modes
 from ir_planner.program import (
@@ -32,6 +32,7 @@ from ir_planner.program import (
     spent,
 )
 from ir_planner.request import Journal
+from ir_planner.robots.joint_cycle import ArmSchedule, ArmWork, Lag
 from ir_planner.scene import PlanningScene
 from ir_planner.timing import Movement
 from ir_values.arrays import FloatArray

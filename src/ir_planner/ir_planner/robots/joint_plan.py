@@ -13,23 +13,23 @@ from ir_description import RobotCells
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
-from ir_planner.cycle import (
-    ArmSchedule,
-    ArmWork,
-    ExclusiveZone,
-    JointCycle,
-    WaitMode,
-    ZoneStretch,
-    cheapest_joint,
-    shortest_joint,
-    zones_of,
-)
+from ir_planner.cycle import WaitMode
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
 from ir_planner.presentation import plot_robots
 from ir_planner.program import MOTORS, ProgramPlan, StageError, program_of
 from ir_planner.request import Journal, bounded
 from ir_planner.robots.arm_program import ArmProgram, check_processes, check_repeatable, planned_arm
+from ir_planner.robots.joint_cycle import (
+    ArmSchedule,
+    ArmWork,
+    ExclusiveZone,
+    JointCycle,
+    ZoneStretch,
+    cheapest_joint,
+    shortest_joint,
+    zones_of,
+)
 from ir_planner.robots.meetings import (
     Cells,
     Meetings,

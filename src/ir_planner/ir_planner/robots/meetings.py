@@ -16,9 +16,9 @@ from ir_description import Equipment, RobotCells
 from ir_kernels import FREE
 from ir_kernels.swept import SweptArm, meeting
 from ir_msgs_py.status import StatusCode
-from ir_planner.cycle import ExclusiveZone, ZoneStretch
 from ir_planner.errors import RequestError
 from ir_planner.robots.arm_program import ArmProgram
+from ir_planner.robots.joint_cycle import ExclusiveZone, ZoneStretch
 from ir_planner.scene import PROOF_TOLERANCE
 from ir_planner.timing import Movement
 

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_planner.cycle.linear import LinearProgram
-from ir_planner.cycle.steady import Curve, ModeWait, WaitMode
+from ir_planner.cycle import Curve, LinearProgram, ModeWait, WaitMode
 from ir_values.arrays import FloatArray
 
 _NO_WAIT = 1e-6  # s
