@@ -261,7 +261,7 @@ REQUESTS = {
         "from ir_planner import Planner\n"
         "planner = Planner('demo')\n"
         "seen.clear()\n"
-        "planner.plan_regional(goal='washer')"
+        "planner.plan_regional(goal='washer_rinse')"
     ),
     "ir plan demo": "from ir_cli.main import main\nmain(['plan', 'demo'])",
 }

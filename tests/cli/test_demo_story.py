@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from ir_cli.errors import CommandError, DemonstrationError
+from ir_cli.errors import CommandError
 from ir_cli.output import Progress
 from ir_cli.ros.demo import LONGEST_PAUSE, Demonstration, finish_recording, recorded
 from ir_cli.ros.robots_demo import driven_together
@@ -24,7 +24,7 @@ from ir_values.errors import CallTimedOutError, RequestRefusedError
 
 STORY = {
     "_plan": RequestRefusedError("no path", -1),
-    "_tour": DemonstrationError("waited 30 s"),
+    "_tour": CommandError("waited 30 s"),
     "_drive": RequestRefusedError("the robot is not ready", -6),
 }
 

@@ -12,7 +12,7 @@ from typing import Any, cast
 
 import pytest
 
-from ir_cli.errors import DemonstrationError
+from ir_cli.errors import CommandError
 from ir_cli.ros.power_tour import PowerWatch, stand_on_motors
 from ir_msgs.msg import PowerMode, PowerState
 from ir_msgs_py.ros.client import Client
@@ -90,7 +90,7 @@ def test_a_mode_that_does_not_come_is_waited_for_by_the_meter_s_time(
     watched: Callable[[FakeMeter], PowerWatch],
 ) -> None:
     waiting = watched(FakeMeter(behind=1.0, step=0.5))
-    with pytest.raises(DemonstrationError, match="waited 1 s for power mode"):
+    with pytest.raises(CommandError, match="waited 1 s for power mode"):
         waiting.wait_for_mode(PowerMode.HIBERNATION)
 
 
@@ -103,7 +103,7 @@ def test_a_mode_that_the_controller_leaves_by_itself_has_not_stayed(
 
 
 def test_a_silent_meter_is_said_to_say_nothing() -> None:
-    with pytest.raises(DemonstrationError, match="the mains meter says nothing"):
+    with pytest.raises(CommandError, match="the mains meter says nothing"):
         watch(FakeMeter(behind=0.0, step=0.1)).stays(PowerMode.STAND_ON_BRAKES, 0.1)
 
 
@@ -129,5 +129,5 @@ def test_a_plant_that_lags_further_than_the_brakes_stay_open_ends_the_tour(
 ) -> None:
     """Once the tour went on for ever."""
     meter = ClosingMeter(behind=500.0, step=0.01)
-    with pytest.raises(DemonstrationError, match="lags 500 s behind the clock"):
+    with pytest.raises(CommandError, match="lags 500 s behind the clock"):
         stand_on_motors(cast(Client, cast(Any, meter)), watched(meter), 0.1)

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_cli.commands import BY_PATH, renamed
-from ir_cli.view.cell_file import SavingError, Watched, save
+from ir_cli.errors import CommandError
+from ir_cli.view.cell_file import Watched, save
 from ir_cli.view.moves import DragTarget, cell_with, edited, meant, pose_in, snippet, targets
 from ir_description import Cell, cell_from_yaml, cell_to_yaml, load_cell
 from ir_description.poses import pose_of, rotation_from_abc
@@ -101,7 +102,7 @@ def test_nothing_is_overwritten_and_a_changed_file_is_not_mixed(tmp_path: Path) 
         "c_moved_2.yaml",
     ]
     path.write_text(LAYOUTS.replace("xyz: [0, 0, 1]", "xyz: [0, 0, 2]"), encoding="utf-8")
-    with pytest.raises(SavingError, match="changed meanwhile"):
+    with pytest.raises(CommandError, match="changed meanwhile"):
         save(Watched(str(path)), cell, moves)
     assert sorted(each.name for each in tmp_path.iterdir()) == [
         "c.yaml",
@@ -110,7 +111,7 @@ def test_nothing_is_overwritten_and_a_changed_file_is_not_mixed(tmp_path: Path) 
     ]
     watched = Watched(str(path))
     path.unlink()
-    with pytest.raises(SavingError):
+    with pytest.raises(CommandError):
         save(watched, cell, moves)
 
 

@@ -16,7 +16,7 @@ from ir_msgs_py.modes import Mode, TransitionTimes
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_sim_driver.controller.driver import Driver
 from ir_sim_driver.controller.settings import ControllerSettings
-from ir_sim_driver.errors import LinkError, TrajectoryRefusedError
+from ir_sim_driver.errors import DriverError, TrajectoryRefusedError
 from ir_sim_driver.plc.inputs import PlcSettings
 from ir_sim_driver.plc.modbus import (
     COILS,
@@ -174,7 +174,7 @@ def test_while_hibernating_the_controller_does_not_answer_for_itself(make, serve
 
 def test_a_taken_port_is_an_error_with_its_number(make, serve):
     driver, _, port = serve(make())
-    with pytest.raises(LinkError, match=str(port)):
+    with pytest.raises(DriverError, match=str(port)):
         opened_on(driver, modbus_port=port)
 
 

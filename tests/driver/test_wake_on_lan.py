@@ -11,7 +11,7 @@ import pytest
 
 from ir_msgs_py.plc import magic_packet, send_packet, wakes
 from ir_msgs_py.ros.testing import PATIENCE
-from ir_sim_driver.errors import LinkError
+from ir_sim_driver.errors import DriverError
 from ir_sim_driver.plc import WakeOnLan
 from ir_sim_driver.plc.modbus import ModbusTcp
 from ir_sim_driver.plc.port import Controller
@@ -80,7 +80,7 @@ def test_a_host_that_is_no_name_is_a_sentence_of_each_link(host):
         lambda: ModbusTcp(modbus=True, modbus_host=host, modbus_port=0).open(NOBODY),
     )
     for link in links:
-        with pytest.raises(LinkError, match="can't be opened"):
+        with pytest.raises(DriverError, match="can't be opened"):
             link()
     with pytest.raises(OSError, match=r"is no address|Errno"):
         send_packet(PACKET, host, 9)

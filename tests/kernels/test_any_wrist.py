@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from robots import kr210, random_rotation
 
-from ir_kernels import Chain, InputError, inverse_kinematics
+from ir_kernels import Chain, KernelError, inverse_kinematics
 from ir_kernels.ik_set import InverseKinematics
 from ir_kernels.inverse_kinematics import SearchedIk, ThreeParallelIk
 from ir_kernels.spherical_wrist import SphericalWristIk
@@ -129,12 +129,12 @@ def test_seven_axes_and_crossed_axes_are_refused_with_the_reason() -> None:
         joint_origin=np.concatenate([robot.joint_origin, np.eye(4)[None]]),
         joint_axis=np.concatenate([robot.joint_axis, [[0.0, 1.0, 0.0]]]),
     )
-    with pytest.raises(InputError, match="the arm has 7 axes: inverse kinematics needs 6"):
+    with pytest.raises(KernelError, match="the arm has 7 axes: inverse kinematics needs 6"):
         inverse_kinematics(Chain(seven), -np.ones(7), np.ones(7))
     axis = robot.joint_axis.copy()
     axis[2] = [0.0, 0.6, 0.8]
     crossed = SimpleNamespace(joint_origin=robot.joint_origin, joint_axis=axis)
-    with pytest.raises(InputError, match="axes 2 and 3 are not parallel"):
+    with pytest.raises(KernelError, match="axes 2 and 3 are not parallel"):
         inverse_kinematics(Chain(crossed), -HALF, HALF)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from robots import kr210, random_chain, random_rotation
 
-from ir_kernels import CcdSettings, Chain, InputError, ccd
+from ir_kernels import CcdSettings, Chain, KernelError, ccd
 from ir_kernels.reference import ccd as reference
 from ir_kernels.reference.chain import axes
 from ir_values.arrays import FloatArray
@@ -161,12 +161,12 @@ def test_a_start_that_is_there_spends_no_work(core: Any) -> None:
 def test_a_bad_argument_is_named(change: dict[str, FloatArray], message: str) -> None:
     arguments: dict[str, Any] = {"pose": np.eye(4), "starts": np.zeros((1, 6))}
     arguments |= {"position_min": np.full(6, -3.0), "position_max": np.full(6, 3.0)} | change
-    with pytest.raises(InputError, match=message):
+    with pytest.raises(KernelError, match=message):
         ccd(Chain(kr210()), **arguments)
 
 
 def test_settings_refuse_what_makes_no_sense() -> None:
-    with pytest.raises(InputError, match="max_sweeps is -1"):
+    with pytest.raises(KernelError, match="max_sweeps is -1"):
         CcdSettings(max_sweeps=-1)
-    with pytest.raises(InputError, match="xi is nan"):
+    with pytest.raises(KernelError, match="xi is nan"):
         CcdSettings(xi=float("nan"))

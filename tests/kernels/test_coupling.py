@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from robots import RobotLiteral, coupled, kr210, power_gradients, random_chain, tool_155
 
-from ir_kernels import DynamicsModel, InputError
+from ir_kernels import DynamicsModel, KernelError
 from ir_kernels.coupling import Coupling
 from ir_kernels.reference.limits import derivative, evaluate
 from ir_values.arrays import FloatArray
@@ -138,5 +138,5 @@ def test_a_coupling_keeps_power_and_comes_back(n: int) -> None:
 
 
 def test_motors_that_do_not_determine_the_joints_are_refused() -> None:
-    with pytest.raises(InputError, match="singular"):
+    with pytest.raises(KernelError, match="singular"):
         DynamicsModel(replace(kr210(), motor_turns=np.ones((6, 6))))

@@ -17,7 +17,7 @@ from robots import (
     tool_155,
 )
 
-from ir_kernels import Chain, DynamicsModel, InputError
+from ir_kernels import Chain, DynamicsModel, KernelError
 from ir_kernels.reference import dynamics as reference
 from ir_values.arrays import FloatArray
 
@@ -304,14 +304,14 @@ def test_torque_limit_steps_down_then_falls_linearly() -> None:
 def test_a_bad_array_is_named(core: Any, bad: Any, message: str) -> None:
     model = DynamicsModel(kr210(), core=core)
     good = np.zeros((3, 6))
-    with pytest.raises(InputError, match=message):
+    with pytest.raises(KernelError, match=message):
         model.inverse_dynamics(good, bad, good)
 
 
 def test_negative_mass_and_impossible_counterbalance_are_refused() -> None:
-    with pytest.raises(InputError, match="'tool' has a mass of -1"):
+    with pytest.raises(KernelError, match="'tool' has a mass of -1"):
         DynamicsModel(kr210(), (LoadLiteral("tool", -1.0, np.zeros(3), np.eye(3)),))
     robot = kr210()
     tiny = type(robot.counterbalance)(gas_volume=1e-4)
-    with pytest.raises(InputError, match="no volume for the gas"):
+    with pytest.raises(KernelError, match="no volume for the gas"):
         DynamicsModel(type(robot)(**{**vars(robot), "counterbalance": tiny}))

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from geometry_cases import CAPSULES, KR210, OPEN, SELF_PAIRS, TCP, Body, Capsule, box, shift
 
-from ir_kernels import Chain, CollisionModel, InputError, KernelError, compiled
+from ir_kernels import Chain, CollisionModel, KernelError, compiled
 
 MODEL = CollisionModel(Chain(KR210, tcp=TCP), CAPSULES, OPEN, SELF_PAIRS)
 GOOD = np.zeros((4, 6))
@@ -75,7 +75,7 @@ def test_bad_configurations_are_refused_by_name(call: Callable[[Any], object], q
     ],
 )
 def test_other_bad_arguments_are_refused_by_name(call: Callable[[], object], name: str) -> None:
-    with pytest.raises(InputError, match=rf"^{re.escape(name)}\b"):
+    with pytest.raises(KernelError, match=rf"^{re.escape(name)}\b"):
         call()
 
 

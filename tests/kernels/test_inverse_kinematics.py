@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from robots import RobotLiteral, kr210, random_rotation
 
-from ir_kernels import Chain, InputError
+from ir_kernels import Chain, KernelError
 from ir_kernels.spherical_wrist import SphericalWristIk
 from ir_values.arrays import FloatArray
 
@@ -210,7 +210,7 @@ def with_axis(joint: int, axis: list[float]) -> RobotLiteral:
 def test_an_arm_of_another_kind_is_refused_with_the_reason(
     robot: RobotLiteral, message: str
 ) -> None:
-    with pytest.raises(InputError, match=message):
+    with pytest.raises(KernelError, match=message):
         SphericalWristIk(Chain(robot), robot.position_min, robot.position_max)
 
 
@@ -227,5 +227,5 @@ def test_an_arm_of_another_kind_is_refused_with_the_reason(
 def test_a_bad_pose_is_named(core: Any, bad: FloatArray, message: str) -> None:
     robot = kr210()
     ik = SphericalWristIk(Chain(robot), robot.position_min, robot.position_max, core=core)
-    with pytest.raises(InputError, match=message):
+    with pytest.raises(KernelError, match=message):
         ik.solve(bad)

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from robots import kr210, tool_155
 
-from ir_kernels import DynamicsModel, InputError
+from ir_kernels import DynamicsModel, KernelError
 from ir_kernels.dynamics import EXCEEDS, UNDECIDED, WITHIN
 from ir_kernels.limits import motion_extrema, polynomial_extrema
 from ir_kernels.reference.interval import Dual, interval, power, sine_cosine
@@ -187,5 +187,5 @@ def test_a_bad_argument_is_named(change: dict[str, Any], message: str) -> None:
         "coefficients": np.zeros((1, 6, 6)),
         "durations": np.ones(1),
     } | change
-    with pytest.raises(InputError, match=message):
+    with pytest.raises(KernelError, match=message):
         DynamicsModel(kr210()).torque_bounds(**arguments)

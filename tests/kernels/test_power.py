@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from robots import kr210, tool_155
 
-from ir_kernels import DynamicsModel, InputError, dc_bus
+from ir_kernels import DynamicsModel, KernelError, dc_bus
 from ir_kernels.power import REGENERATIONS, DcBusParameters, Regeneration, drive_energy
 
 CAPACITY = 106.0  # J, of the KR C4's capacitors between rest voltage and brake chopper
@@ -91,10 +91,10 @@ def test_drive_energy_is_mechanical_work_plus_copper() -> None:
     ],
 )
 def test_a_bad_argument_is_named(arguments: Any, message: str) -> None:
-    with pytest.raises(InputError, match=message):
+    with pytest.raises(KernelError, match=message):
         dc_bus(*arguments)
 
 
 def test_an_unknown_regeneration_lists_the_known() -> None:
-    with pytest.raises(InputError, match="known are shared, none, fed_back"):
+    with pytest.raises(KernelError, match="known are shared, none, fed_back"):
         DcBusParameters(1.0, "magic")  # type: ignore[arg-type]

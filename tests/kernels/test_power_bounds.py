@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from robots import kr210, tool_155
 
-from ir_kernels import DynamicsModel, InputError
+from ir_kernels import DynamicsModel, KernelError
 from ir_kernels.reference.limits import derivative, evaluate
 from ir_values.arrays import FloatArray
 
@@ -77,5 +77,5 @@ def test_without_a_compiler_the_bounds_are_as_sharp(core: Any) -> None:
 
 def test_a_piece_without_a_length_is_refused(core: Any) -> None:
     c, T = motion(2)
-    with pytest.raises(InputError, match="longest is 0"):
+    with pytest.raises(KernelError, match="longest is 0"):
         DynamicsModel(kr210(), core=core).power_bounds(c, T, 0.0)

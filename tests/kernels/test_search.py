@@ -21,7 +21,7 @@ from geometry_cases import (
     box,
 )
 
-from ir_kernels import FREE, Chain, CollisionModel, InputError, compiled
+from ir_kernels import FREE, Chain, CollisionModel, KernelError, compiled
 from ir_kernels.search import BidirectionalTree
 
 SAFETY = 0.02
@@ -268,12 +268,12 @@ def test_arguments_that_make_no_sense_are_named(changed: dict[str, Any], said: s
         "collision": model(GATE), "start": LEFT, "goals": GOALS, "threshold": SAFETY, "seed": 0,
         "low": KR210.position_min, "high": KR210.position_max, "scale": SCALE,
     }  # fmt: skip
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(KernelError, match=said):
         BidirectionalTree(**{**usual, **changed})
 
 
 def test_a_negative_budget_is_refused() -> None:
-    with pytest.raises(InputError, match="max_edges is -1"):
+    with pytest.raises(KernelError, match="max_edges is -1"):
         tree(model(GATE), LEFT, GOALS).grow(-1)
     untouched = tree(model(GATE), LEFT, GOALS)
     assert not untouched.grow(0)

@@ -30,7 +30,7 @@ from ir_kernels import (
     Chain,
     CollisionModel,
     DynamicsModel,
-    InputError,
+    KernelError,
     SplineCost,
     SplineDescent,
     compiled,
@@ -265,7 +265,7 @@ GOOD = swing(16)
     ],
 )
 def test_bad_control_points_are_refused_by_name(call: Callable[..., object], control: Any) -> None:
-    with pytest.raises(InputError, match=r"^control\b"):
+    with pytest.raises(KernelError, match=r"^control\b"):
         call(control, 0.1)
 
 
@@ -291,7 +291,7 @@ def test_bad_control_points_are_refused_by_name(call: Callable[..., object], con
     ],
 )
 def test_other_bad_arguments_are_refused_by_name(call: Callable[[], object], name: str) -> None:
-    with pytest.raises(InputError, match=rf"^{name}\b"):
+    with pytest.raises(KernelError, match=rf"^{name}\b"):
         call()
 
 
@@ -323,7 +323,7 @@ def bad_terms() -> list[Any]:
 @pytest.mark.parametrize(("name", "value"), bad_terms())
 def test_bad_terms_are_refused_by_name(name: str, value: Any) -> None:
     collision, dynamics = kr210_models(BLOCK, few=True)
-    with pytest.raises(InputError, match=rf"^terms\.{re.escape(name)}\b"):
+    with pytest.raises(KernelError, match=rf"^terms\.{re.escape(name)}\b"):
         SplineCost(collision, dynamics, terms(kr210(), len(collision.pairs), **{name: value}))
 
 
@@ -331,11 +331,11 @@ def test_models_of_two_robots_are_refused() -> None:
     collision, _ = kr210_models(BLOCK, few=True)
     t = terms(kr210(), len(collision.pairs))
     for other in (chain_models(0, 5)[2], DynamicsModel(random_chain(np.random.default_rng(0), 6))):
-        with pytest.raises(InputError, match="models of one robot"):
+        with pytest.raises(KernelError, match="models of one robot"):
             SplineCost(collision, other, t)
     shifted = kr210().joint_origin.copy()
     shifted[2, 0, 3] += 1e-3
-    with pytest.raises(InputError, match=r"differ by 0\.001"):
+    with pytest.raises(KernelError, match=r"differ by 0\.001"):
         SplineCost(collision, DynamicsModel(replace(kr210(), joint_origin=shifted)), t)
 
 
@@ -344,5 +344,5 @@ def test_thresholds_without_pairs_have_no_columns() -> None:
     dynamics = DynamicsModel(kr210())
     assert SplineCost(collision, dynamics, terms(kr210(), 0)).value(GOOD, 0.1).value > 0.0
     for threshold in (np.zeros((1, 1)), np.zeros((0, 0)), np.zeros(0), 0.02):
-        with pytest.raises(InputError, match=r"^terms\.threshold"):
+        with pytest.raises(KernelError, match=r"^terms\.threshold"):
             SplineCost(collision, dynamics, terms(kr210(), 0, threshold=threshold))

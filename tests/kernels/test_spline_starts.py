@@ -9,7 +9,7 @@ import pytest
 from scipy.interpolate import make_interp_spline
 from spline_cases import WORKING, kr210_cost
 
-from ir_kernels import InputError
+from ir_kernels import KernelError
 from ir_kernels.limits import polynomial_samples
 from ir_kernels.spline import CubicPath, SplineCost, SplineStarts
 from ir_values.arrays import FloatArray
@@ -97,11 +97,11 @@ def test_a_profile_gets_cheaper_with_work(compiled_core: Any) -> None:
 def test_what_makes_no_sense_is_refused(compiled_core: Any) -> None:
     cost = kr210_cost(compiled_core, few=True)
     (path, s) = passed()
-    with pytest.raises(InputError, match="no length"):
+    with pytest.raises(KernelError, match="no length"):
         cost.descend_along([np.repeat(WORKING[None], 2, axis=0)], STARTS, evaluations=5)
-    with pytest.raises(InputError, match="at least 4"):
+    with pytest.raises(KernelError, match="at least 4"):
         cost.descend_profile(path, s[:3], 1.0)
-    with pytest.raises(InputError, match="begins have to rise"):
+    with pytest.raises(KernelError, match="begins have to rise"):
         polynomial_samples(np.zeros((2, 6, 4)), np.ones(2), np.zeros(2), np.zeros(3))
 
 

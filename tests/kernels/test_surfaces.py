@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_kernels import InputError
+from ir_kernels import KernelError
 from ir_kernels.surfaces import Surface, core_of
 from ir_values.arrays import FloatArray
 
@@ -113,9 +113,9 @@ def test_surfaces_that_are_looked_at_too_long_are_taken_to_meet() -> None:
 
 
 def test_what_is_no_surface_is_refused() -> None:
-    with pytest.raises(InputError, match="expected"):
+    with pytest.raises(KernelError, match="expected"):
         Surface(np.zeros((2, 3, 3)), np.zeros(3))
-    with pytest.raises(InputError, match="not finite"):
+    with pytest.raises(KernelError, match="not finite"):
         Surface(np.full((1, 3, 3), np.nan), np.zeros(1))
     empty = Surface(np.zeros((0, 3, 3)), np.zeros(0))
     assert not empty.meets(empty, np.eye(4)[None], 1.0, PLENTY)[0].any()

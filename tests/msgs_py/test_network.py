@@ -11,7 +11,7 @@ import pytest
 
 from ir_msgs_py.ros.network import CHOICES, apply_network, network_variables, profile
 from ir_msgs_py.ros.testing import PATIENCE
-from ir_values.errors import ParameterError
+from ir_values.errors import InvalidValueError
 
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 PEERS = "ROS_STATIC_PEERS"
@@ -53,13 +53,13 @@ def test_what_is_not_followed_is_said(capsys: pytest.CaptureFixture[str]) -> Non
 
 
 def test_an_unknown_choice_lists_the_known() -> None:
-    with pytest.raises(ParameterError, match="loopback, secure, insecure"):
+    with pytest.raises(InvalidValueError, match="loopback, secure, insecure"):
         network_variables({"IR_NETWORK": "open"})
 
 
 def test_secure_asks_for_security() -> None:
     asked = {"IR_NETWORK": "secure", "ROS_SECURITY_ENABLE": "true"}
-    with pytest.raises(ParameterError, match="ROS_SECURITY_STRATEGY=Enforce must be set"):
+    with pytest.raises(InvalidValueError, match="ROS_SECURITY_STRATEGY=Enforce must be set"):
         network_variables(asked)
     assert RANGE not in network_variables({**asked, "ROS_SECURITY_STRATEGY": "Enforce"})[0]
 

@@ -14,7 +14,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from ir_msgs_py.ros.parameters import Parameters, check_names
-from ir_values.errors import ParameterError
+from ir_values.errors import InvalidValueError
 from ir_values.settings import setting
 
 
@@ -110,7 +110,7 @@ def test_a_misspelt_name_is_refused_on_the_command_line_and_warned_of_in_files(r
     started = Node("started", context=ros_context, parameter_overrides=given)
     Parameters(started, Search)
     if words:
-        with pytest.raises(ParameterError, match=r"no parameter 'sped': did you mean speed\?"):
+        with pytest.raises(InvalidValueError, match=r"no parameter 'sped': did you mean speed\?"):
             check_names(started, words)
     else:
         check_names(started, words)
@@ -146,7 +146,7 @@ def test_a_change_can_be_refused_for_the_moment(node):
 )
 def test_a_node_started_with_a_bad_value_says_so(ros_context, name, value, sentence):
     node = Node("searcher", context=ros_context, parameter_overrides=[Parameter(name, value=value)])
-    with pytest.raises(ParameterError, match=sentence):
+    with pytest.raises(InvalidValueError, match=sentence):
         Parameters(node, Search)
     node.destroy_node()
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from ir_values.errors import ParameterError
+from ir_values.errors import InvalidValueError
 from ir_values.settings import check_settings, describe, setting, settings_table
 
 
@@ -38,7 +38,7 @@ class Oven:
     ],
 )
 def test_a_value_out_of_range_is_named(changes, sentence):
-    with pytest.raises(ParameterError, match=re.escape(sentence)):
+    with pytest.raises(InvalidValueError, match=re.escape(sentence)):
         Oven(**changes)
 
 
@@ -55,5 +55,5 @@ def test_a_field_without_description_is_refused():
     class Bare:
         heat: float = 1.0
 
-    with pytest.raises(ParameterError, match=r"Bare\.heat has no description"):
+    with pytest.raises(InvalidValueError, match=r"Bare\.heat has no description"):
         describe(Bare)

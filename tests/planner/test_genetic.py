@@ -35,7 +35,7 @@ from ir_planner.search.genetic_correction import Genetic, colliding_stretch, cor
 from ir_planner.search.population import Evolution, _Breeder, evolve, path_matrix
 from ir_planner.search.registry import SEARCHES
 from ir_planner.search.variety import evenly, first_different
-from ir_values.errors import ParameterError
+from ir_values.errors import InvalidValueError
 
 FloatArray = NDArray[np.float64]
 SceneOf = Callable[[str], PlanningScene]
@@ -364,7 +364,7 @@ def test_a_cancel_is_heard_between_generations(degrees: Any, options: PlanOption
 def test_settings_that_make_no_sense_are_refused_with_a_sentence(
     values: Any, sentence: str
 ) -> None:
-    with pytest.raises(ParameterError, match=sentence.replace(".", r"\.")):
+    with pytest.raises(InvalidValueError, match=sentence.replace(".", r"\.")):
         Genetic(**values)
 
 

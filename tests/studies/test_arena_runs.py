@@ -19,7 +19,7 @@ from ir_studies import Means
 from ir_studies.arena import ArenaSettings, read_settings, run_arena
 from ir_studies.arena.figures import columns
 from ir_studies.arena.runs import FinishedArena
-from ir_studies.errors import FolderError, WorkerError
+from ir_studies.errors import StudyError
 from ir_studies.work.results import NAME
 
 Fought = Callable[..., FinishedArena]
@@ -147,14 +147,14 @@ def test_a_cell_that_changed_between_two_runs_is_refused(
     run_arena(read_settings(settings), tmp_path / "out", Means(1, command=command))
     file.write_text(cell_to_yaml(load_cell("deep_box")).replace("name: deep_box", "name: open"))
     settings.write_text(settings.read_text().replace("tasks: [home->p1]\n", ""))
-    with pytest.raises(FolderError, match="results of another cell"):
+    with pytest.raises(StudyError, match="results of another cell"):
         run_arena(read_settings(settings), tmp_path / "out", Means(1, command=command))
 
 
 def test_a_folder_of_other_settings_is_refused(fought: Fought, tmp_path: Path) -> None:
     fought("sbl")
     other = ArenaSettings(cells=("open",), planners=("sbl",), seconds=2.0)
-    with pytest.raises(FolderError, match=r"results with seconds 0.01, the settings have 2.0"):
+    with pytest.raises(StudyError, match=r"results with seconds 0.01, the settings have 2.0"):
         run_arena(other, tmp_path / "out")
 
 
@@ -168,7 +168,7 @@ def test_a_folder_from_before_further_iterations_goes_on_with_none(
     kept = (tmp_path / NAME).read_text()
     assert "further_iterations" not in kept
     assert table(run_arena(settings, tmp_path, Means(2, command=("false",)))) == table(first)
-    with pytest.raises(FolderError, match="further_iterations"):
+    with pytest.raises(StudyError, match="further_iterations"):
         run_arena(replace(settings, further_iterations=7), tmp_path)
 
 
@@ -176,7 +176,7 @@ def test_two_arenas_in_one_folder_are_one_too_many(fought: Fought) -> None:
     refused: list[str] = []
 
     def second(phase: str, done: int, of: int, best: str) -> None:
-        with pytest.raises(FolderError) as error:
+        with pytest.raises(StudyError) as error:
             fought("sbl")
         refused.append(str(error.value))
 
@@ -193,20 +193,20 @@ def test_a_file_of_something_else_is_refused_and_kept(
     path = tmp_path / "out" / NAME
     path.parent.mkdir()
     path.write_bytes(content)
-    with pytest.raises(FolderError, match="holds no results of an arena"):
+    with pytest.raises(StudyError, match="holds no results of an arena"):
         fought("sbl")
     assert path.read_bytes() == content
 
 
 def test_a_folder_that_cannot_be_written_is_named(fought: Fought, tmp_path: Path) -> None:
     (tmp_path / "out").write_text("a file")
-    with pytest.raises(FolderError, match="can't be written"):
+    with pytest.raises(StudyError, match="can't be written"):
         fought("sbl")
 
 
 def test_what_lies_where_the_database_belongs_is_named(fought: Fought, tmp_path: Path) -> None:
     (tmp_path / "out" / "arena.db.part").mkdir(parents=True)
-    with pytest.raises(FolderError, match=r"arena\.db can't be written"):
+    with pytest.raises(StudyError, match=r"arena\.db can't be written"):
         fought("sbl", seeds=1)
 
 
@@ -214,14 +214,14 @@ def test_a_database_that_cannot_be_finished_leaves_nothing_behind(
     fought: Fought, tmp_path: Path
 ) -> None:
     (tmp_path / "out" / "arena.db").mkdir(parents=True)
-    with pytest.raises(FolderError, match=r"arena\.db can't be written"):
+    with pytest.raises(StudyError, match=r"arena\.db can't be written"):
         fought("sbl", seeds=1)
     assert not (tmp_path / "out" / "arena.db.part").exists()
 
 
 def test_workers_that_never_start_end_the_arena(tmp_path: Path) -> None:
     settings = ArenaSettings(cells=("open",), tasks=("home->p1",), seeds=5)
-    with pytest.raises(WorkerError, match="a worker died before it could start"):
+    with pytest.raises(StudyError, match="a worker died before it could start"):
         run_arena(settings, tmp_path, Means(2, command=("false",)))
 
 

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from ir_studies import LayoutSettings, Means, StoppedError, run_layout
-from ir_studies.errors import WorkerError
+from ir_studies.errors import StudyError
 from ir_studies.layout import Layouts
 from ir_studies.work import cluster
 from ir_studies.work.results import NAME
@@ -36,7 +36,7 @@ def test_without_dask_a_sentence_says_how_to_install_it(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(WorkerError, match=r'pip install "ir_studies\[cluster\]"'):
+    with pytest.raises(StudyError, match=r'pip install "ir_studies\[cluster\]"'):
         run_layout(SETTINGS, tmp_path, Means(scheduler="tcp://127.0.0.1:1"))
 
 
@@ -47,7 +47,7 @@ def test_without_dask_a_sentence_says_how_to_install_it(
 )  # fmt: skip
 def test_words_that_are_no_address_are_refused_before_anybody_waits(address: str) -> None:
     with pytest.raises(
-        WorkerError, match=r"it must be an address with a port .* as tcp://127\.0\.0\.1:8786"
+        StudyError, match=r"it must be an address with a port .* as tcp://127\.0\.0\.1:8786"
     ):
         Means(scheduler=address)
 
@@ -143,7 +143,7 @@ def test_a_scheduler_that_is_killed_meanwhile_ends_the_study_which_goes_on_later
         if done == 3:
             processes[0].kill()
 
-    with pytest.raises(WorkerError, match="the scheduler is gone"):
+    with pytest.raises(StudyError, match="the scheduler is gone"):
         run_layout(SETTINGS, tmp_path / "both", Means(scheduler=address, progress=kill))
     assert (tmp_path / "both" / NAME).read_bytes().count(b"\n") >= 3
     same(
@@ -180,14 +180,12 @@ def test_nobody_or_no_scheduler_at_the_address_and_other_builds_are_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(cluster, "_CONNECT_S", 2.0)
-    with pytest.raises(WorkerError, match="no Dask scheduler answers at"):
+    with pytest.raises(StudyError, match="no Dask scheduler answers at"):
         run_layout(SETTINGS, tmp_path / "a", Means(scheduler="tcp://127.0.0.1:1"))
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
         silent.listen()
-        with pytest.raises(
-            WorkerError, match=r"no Dask scheduler answers at .* nothing within 2 s"
-        ):
+        with pytest.raises(StudyError, match=r"no Dask scheduler answers at .* nothing within 2 s"):
             run_layout(
                 SETTINGS,
                 tmp_path / "a",
@@ -195,12 +193,12 @@ def test_nobody_or_no_scheduler_at_the_address_and_other_builds_are_refused(
             )
     monkeypatch.setattr(cluster, "_CONNECT_S", 10.0)  # a busy machine's scheduler answers within it
     address = scheduler(processes, tmp_path, wait_for)
-    with pytest.raises(WorkerError, match="has no worker: start one, dask worker"):
+    with pytest.raises(StudyError, match="has no worker: start one, dask worker"):
         run_layout(SETTINGS, tmp_path / "b", Means(scheduler=address))
     worker(processes, tmp_path, address)
     monkeypatch.setattr(cluster, "_CONNECT_S", 60.0)
     monkeypatch.setattr(cluster, "computed_with", lambda kind: "an abacus")
-    with pytest.raises(WorkerError, match="not with an abacus"):
+    with pytest.raises(StudyError, match="not with an abacus"):
         run_layout(replace(SETTINGS, placements=2), tmp_path / "c", Means(scheduler=address))
 
 

@@ -19,7 +19,7 @@ import pytest
 
 from ir_description import cell_to_yaml, load_cell
 from ir_studies import LayoutSettings, Means, run_layout
-from ir_studies.errors import FolderError, StoppedError
+from ir_studies.errors import StoppedError, StudyError
 from ir_studies.layout import Layouts, search
 from ir_studies.layout.search import points
 from ir_studies.layout.settings import read_layout
@@ -87,9 +87,7 @@ def test_more_placements_are_added_to_a_folder_and_other_budgets_refused(laid: L
     made: list[str] = []
     laid(replace(SPREAD, keep=3), progress=lambda phase, *_: made.append(phase))
     assert 0 < len(made) < 100
-    with pytest.raises(
-        FolderError, match=r"results with time_value 500.0, the settings have 100.0"
-    ):
+    with pytest.raises(StudyError, match=r"results with time_value 500.0, the settings have 100.0"):
         laid(replace(SPREAD, time_value=100.0))
 
 
@@ -135,7 +133,8 @@ def test_what_is_left_behind(laid: Laid, tmp_path: Path) -> None:
 FULL = """
 import sys
 sys.path[:0] = {path!r}
-from ir_studies import Means, read_layout, run_layout
+from ir_studies import Means, run_layout
+from ir_studies.layout.settings import read_layout
 from ir_studies.errors import StudyError
 try:
     run_layout(read_layout({settings!r}), {folder!r}, Means(1, command={command!r}))

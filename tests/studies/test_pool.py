@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from ir_studies.errors import WorkerError
+from ir_studies.errors import StudyError
 from ir_studies.work import Job, StudyJob
 from ir_studies.work.pool import Pool
 
@@ -98,7 +98,7 @@ def test_why_a_worker_cannot_begin_is_said_at_once() -> None:
     refuses = f'input(); print(\'{{"refused": "{text}"}}\', flush=True)'
     with (
         Pool(TASK, 2, (sys.executable, "-S", "-c", refuses)) as pool,
-        pytest.raises(WorkerError, match=f"a worker can't begin: {text}"),
+        pytest.raises(StudyError, match=f"a worker can't begin: {text}"),
     ):
         list(pool.rows([Job("a"), Job("b")]))
 

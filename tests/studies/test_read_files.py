@@ -16,7 +16,7 @@ from ir_recorder.recording.arithmetic import arithmetic
 from ir_studies import Means, run_arena
 from ir_studies.arena import ArenaSettings
 from ir_studies.arena.one_run import maker as arena_maker
-from ir_studies.errors import FolderError, WorkerError
+from ir_studies.errors import StudyError
 from ir_studies.statistics.runs import maker as statistics_maker
 from ir_studies.work import fingerprint
 from ir_studies.work.results import digest_of_tasks, refuse_others, task_digests
@@ -40,7 +40,7 @@ def test_a_task_with_another_goal_is_refused_and_a_new_one_is_taken(
     first, second = cell.tasks[:2]
     run(first)
     run(second, first)
-    with pytest.raises(FolderError, match="results of another task home->p1 of"):
+    with pytest.raises(StudyError, match="results of another task home->p1 of"):
         run(replace(first, goal=first.goal + 1e-9), second)
 
 
@@ -52,9 +52,9 @@ def test_a_task_more_or_another_one_changes_what_pairs_are_drawn_from() -> None:
 
 
 def test_a_worker_that_reads_another_file_than_the_study_refuses() -> None:
-    with pytest.raises(WorkerError, match="cell open is not here what the study has read"):
+    with pytest.raises(StudyError, match="cell open is not here what the study has read"):
         arena_maker({"cells": ["open"], "read": {"open": "0"}})
-    with pytest.raises(WorkerError, match="tasks of open is not here what the study has read"):
+    with pytest.raises(StudyError, match="tasks of open is not here what the study has read"):
         statistics_maker({"cell": "open", "read": {"tasks of open": "0"}})
     refuse_others({"open": "1"}, {"open": "1", "more": "2"})
 

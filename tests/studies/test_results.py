@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ir_studies.errors import FolderError
+from ir_studies.errors import StudyError
 from ir_studies.work import Job, Results
 from ir_studies.work.results import NAME
 
@@ -75,7 +75,7 @@ def test_a_damaged_line_is_named_and_nothing_is_changed(tmp_path: Path, line: by
     lines = filled(tmp_path).split(b"\n")
     content = b"\n".join([*lines[:3], line, *lines[3:]])
     (tmp_path / NAME).write_bytes(content)
-    with pytest.raises(FolderError, match="line 4 is damaged"):
+    with pytest.raises(StudyError, match="line 4 is damaged"):
         opened(tmp_path)
     assert (tmp_path / NAME).read_bytes() == content
 
@@ -96,7 +96,7 @@ def test_a_file_system_without_locks_is_named(
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
     monkeypatch.setattr(fcntl, "flock", refused)
-    with pytest.raises(FolderError, match="can't be used: No locks available"):
+    with pytest.raises(StudyError, match="can't be used: No locks available"):
         opened(tmp_path)
 
 
@@ -104,12 +104,12 @@ def test_a_full_disk_is_named_when_the_file_begins(tmp_path: Path) -> None:
     (tmp_path / NAME).symlink_to(
         "/dev/full"
     )  # a device: links are refused, as by an attacker's folder
-    with pytest.raises(FolderError, match="can't be written"):
+    with pytest.raises(StudyError, match="can't be written"):
         opened(tmp_path)
     (tmp_path / NAME).unlink()
     results = opened(tmp_path)
     full = os.open("/dev/full", os.O_WRONLY)
     os.dup2(full, results._file.fileno())
     os.close(full)
-    with pytest.raises(FolderError, match="can't be written: No space left"), results:
+    with pytest.raises(StudyError, match="can't be written: No space left"), results:
         results.add(Job("0"), {})

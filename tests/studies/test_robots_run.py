@@ -18,7 +18,7 @@ from _robots_judge import Judge, Path
 from ir_description import RobotCells, load_robot_cells
 from ir_msgs_py.report import PlannedMovement
 from ir_planner.robots import RobotsPlan, plan_robots
-from ir_studies.errors import DrivingError
+from ir_studies.errors import StudyError
 from ir_studies.stepped_run import RobotRun, driven_robots
 
 MARGIN = 0.02  # m: S_m
@@ -160,5 +160,5 @@ def test_a_machine_of_one_robot_is_waited_for_and_never_too_early(tmp_path: File
 def test_a_robot_whose_turn_never_comes_stands_and_says_so() -> None:
     right = tuple(replace(step, set_signals=()) for step in programs()["right"])
     silent = {**programs(), "right": right}
-    with pytest.raises(DrivingError, match=r"left: .*signal zone_1 did not come within 30 s"):
+    with pytest.raises(StudyError, match=r"left: .*signal zone_1 did not come within 30 s"):
         driven(silent)

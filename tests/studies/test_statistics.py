@@ -18,7 +18,7 @@ from ir_cli.main import main
 from ir_planner import Planner
 from ir_recorder.analysis.intervals import mean_of
 from ir_studies import Means, read_study
-from ir_studies.errors import FolderError, SettingsError
+from ir_studies.errors import SettingsError, StudyError
 from ir_studies.statistics.findings import findings_of
 from ir_studies.statistics.outputs import columns, page_html, summary_of
 from ir_studies.statistics.runs import NEAREST, maker, pair_of, places_of
@@ -234,7 +234,7 @@ def test_a_study_leaves_table_and_page(tmp_path: Path) -> None:
     head = json.loads(results.read_text().splitlines()[1])
     digest = head["cells"]["plant nominal"]
     results.write_text(results.read_text().replace(digest, digest[::-1]))
-    with pytest.raises(FolderError, match="results of another plant nominal"):
+    with pytest.raises(StudyError, match="results of another plant nominal"):
         study.run(tmp_path, Means(1))
 
 

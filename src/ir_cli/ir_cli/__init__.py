@@ -9,6 +9,6 @@ import os
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-from ir_cli.errors import CommandError, DemonstrationError  # noqa: E402
+from ir_cli.errors import CommandError  # noqa: E402
 
-__all__ = ["CommandError", "DemonstrationError"]
+__all__ = ["CommandError"]

@@ -3,8 +3,7 @@
 ::
 
     CommandError
-    ├── InputError          what was typed makes no sense: exit code 2
-    └── DemonstrationError  a step of the demonstration failed
+    └── InputError  what was typed makes no sense: exit code 2
 """
 
 from __future__ import annotations
@@ -23,10 +22,6 @@ class InputError(CommandError):
     """What was typed, or the file that was named, makes no sense."""
 
     exit_code = 2
-
-
-class DemonstrationError(CommandError):
-    """A step of the demonstration failed."""
 
 
 SHOWN_NAMES = 8

@@ -33,8 +33,7 @@ from ir_description.files.making import (
     with_home,
     with_masses,
 )
-from ir_kernels import Chain
-from ir_kernels import InputError as KernelInputError
+from ir_kernels import Chain, KernelError
 from ir_kernels.wrist_geometry import arm_lines
 from ir_values.arrays import FloatArray
 from ir_values.errors import RobotFileError
@@ -121,7 +120,7 @@ def _check_axes(arm: UrdfArm) -> None:
     """Raise InvalidValueError for an arm whose axes no inverse kinematics here solves."""
     try:
         arm_lines(Chain(arm))
-    except KernelInputError as error:
+    except KernelError as error:
         names = ", ".join(joint.name for joint in arm.joints)
         raise InvalidValueError(f"{error}; its axes are {names}, see --tip") from error
 

@@ -10,9 +10,12 @@ import numpy as np
 
 from ir_cli.self_pairs import kept_sentences
 from ir_description import Load, RobotModel
-from ir_kernels import Chain, CollisionModel, DynamicsModel, inverse_kinematics
 from ir_kernels import (
-    InputError as KernelInputError,
+    Chain,
+    CollisionModel,
+    DynamicsModel,
+    KernelError,
+    inverse_kinematics,
 )
 from ir_kernels.inverse_kinematics import SearchedIk, ThreeParallelIk
 from ir_kernels.spherical_wrist import SphericalWristIk
@@ -42,7 +45,7 @@ def remarks_on(robot: RobotModel) -> tuple[Remark, ...]:
     chain = Chain(robot)
     try:
         arm_lines(chain)
-    except KernelInputError as error:
+    except KernelError as error:
         return (Remark("error", "axes", str(error)),)
     solver = inverse_kinematics(chain, robot.position_min, robot.position_max)
     found = [

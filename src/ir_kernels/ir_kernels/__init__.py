@@ -6,7 +6,7 @@ from ir_kernels.ccd import CcdSettings, ccd
 from ir_kernels.chain import Chain
 from ir_kernels.collision import COLLIDES, FREE, UNDECIDED, CollisionModel
 from ir_kernels.dynamics import DynamicsModel
-from ir_kernels.errors import InputError, KernelError
+from ir_kernels.errors import KernelError
 from ir_kernels.inverse_kinematics import inverse_kinematics
 from ir_kernels.power import dc_bus
 from ir_kernels.spline import SplineCost, SplineDescent
@@ -19,7 +19,6 @@ __all__ = [
     "Chain",
     "CollisionModel",
     "DynamicsModel",
-    "InputError",
     "KernelError",
     "SplineCost",
     "SplineDescent",

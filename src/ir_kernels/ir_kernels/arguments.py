@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ir_kernels import compiled
-from ir_kernels.errors import InputError
+from ir_kernels.errors import KernelError
 from ir_values.arrays import FloatArray
 
 FLOAT64 = np.dtype(np.float64)
@@ -34,23 +34,23 @@ def shaped(name: str, value: ArrayLike, *shape: int | None) -> FloatArray:
         ):
             return value
     if isinstance(value, np.ndarray) and not value.flags.c_contiguous:
-        raise InputError(
+        raise KernelError(
             f"{name} is not C-contiguous (strides {value.strides}): pass np.ascontiguousarray of it"
         )
     try:
         raw = np.asarray(value)
     except ValueError as error:
-        raise InputError(f"{name} is not an array of numbers: {error}") from error
+        raise KernelError(f"{name} is not an array of numbers: {error}") from error
     if raw.dtype.kind not in "fiu":
-        raise InputError(f"{name} has dtype {raw.dtype}, expected float64")
+        raise KernelError(f"{name} has dtype {raw.dtype}, expected float64")
     array: FloatArray = np.asarray(raw, dtype=np.float64)
     wanted = tuple("N" if length is None else length for length in shape)
     if array.ndim != len(shape) or any(
         w is not None and w != g for w, g in zip(shape, array.shape, strict=True)
     ):
-        raise InputError(f"{name} has shape {array.shape}, expected {wanted}")
+        raise KernelError(f"{name} has shape {array.shape}, expected {wanted}")
     if array.size == 0:
-        raise InputError(f"{name} is empty: its shape is {array.shape}")
+        raise KernelError(f"{name} is empty: its shape is {array.shape}")
     return array
 
 
@@ -61,10 +61,10 @@ def _all_finite(array: FloatArray) -> bool:
 
 
 def finite(name: str, array: FloatArray) -> FloatArray:
-    """`array` of any shape, (n,) or (N, n), or InputError that says where it is not finite."""
+    """`array` of any shape, (n,) or (N, n), or KernelError that says where it is not finite."""
     if not _all_finite(array):
         where = np.argwhere(~np.isfinite(array))[0].tolist()
-        raise InputError(f"{name}{where} is {array[tuple(where)]}: it has to be finite")
+        raise KernelError(f"{name}{where} is {array[tuple(where)]}: it has to be finite")
     return array
 
 
@@ -74,18 +74,18 @@ def checked(name: str, value: ArrayLike, *shape: int | None) -> FloatArray:
 
 
 def same_length(**arrays: FloatArray) -> None:
-    """Raise InputError when batches that belong together have different lengths."""
+    """Raise KernelError when batches that belong together have different lengths."""
     lengths = {name: len(array) for name, array in arrays.items()}
     if len(set(lengths.values())) > 1:
         said = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-        raise InputError(f"batches of different length: {said}")
+        raise KernelError(f"batches of different length: {said}")
 
 
 def number(
     name: str, value: SupportsFloat, least: float, most: float = np.inf, *, above: bool = False
 ) -> float:
     """`value` as a finite float within least and most, not least itself where `above`; or
-    InputError.
+    KernelError.
     """
     try:
         number = float(value)
@@ -96,5 +96,5 @@ def number(
         bound = f"{'above' if above else 'at least'} {least:g}" + (
             f" and at most {most:g}" if most < np.inf else ""
         )
-        raise InputError(f"{name} is {value!r}: expected a finite number {bound}")
+        raise KernelError(f"{name} is {value!r}: expected a finite number {bound}")
     return number

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ir_kernels import compiled, data
 from ir_kernels.arguments import checked
 from ir_kernels.chain import Chain
-from ir_kernels.errors import InputError
+from ir_kernels.errors import KernelError
 from ir_kernels.reference import ccd as reference
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
@@ -37,10 +37,10 @@ class CcdSettings:
         for name in ("rotation_length", "xi", "newton_tolerance"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= 0.0):
-                raise InputError(f"{name} is {value}: it has to be finite and not negative")
+                raise KernelError(f"{name} is {value}: it has to be finite and not negative")
         for name in ("max_sweeps", "newton_steps"):
             if getattr(self, name) < 0:
-                raise InputError(f"{name} is {getattr(self, name)}: it has to be 0 or more")
+                raise KernelError(f"{name} is {getattr(self, name)}: it has to be 0 or more")
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def ccd(
     position_max] (n,)
     that minimises Psi: closed form per joint, so Psi never grows. Starts outside the limits are
     moved onto them. Starts don't know of each other: a start ends the same in any batch. Raises
-    InputError.
+    KernelError.
     """
     settings = CcdSettings() if settings is None else settings
     target = data.pose(pose, "pose")
@@ -89,7 +89,7 @@ def ccd(
     high = data.array(np.ascontiguousarray(position_max), "position_max", (chain.n,))
     if (low > high).any():
         j = int(np.argmax(low > high))
-        raise InputError(
+        raise KernelError(
             f"position_min[{j}] is {low[j]} rad, above position_max[{j}], {high[j]} rad"
         )
     limits = (settings.xi, settings.max_sweeps, settings.newton_steps, settings.newton_tolerance)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ir_kernels import compiled, data, portable
 from ir_kernels.data import ChainLike
-from ir_kernels.errors import InputError
+from ir_kernels.errors import KernelError
 from ir_values.arrays import FloatArray
 
 AXIS_TOLERANCE = 1e-6
@@ -21,7 +21,7 @@ class Chain:
     point in link n.
 
     `robot` gives joint_origin (n, 4, 4) and joint_axis (n, 3). Joint values are (N, n) in rad;
-    limits are no business of the kinematics. Raises InputError for anything that isn't a chain.
+    limits are no business of the kinematics. Raises KernelError for anything that isn't a chain.
     """
 
     robot: ChainLike
@@ -38,9 +38,9 @@ class Chain:
         axis = data.array(robot.joint_axis, "joint_axis", (len(origin), 3)).copy()
         length = np.linalg.norm(axis, axis=1)
         if len(origin) == 0:
-            raise InputError("joint_origin has length 0: a chain has at least one joint")
+            raise KernelError("joint_origin has length 0: a chain has at least one joint")
         if (np.abs(length - 1.0) > AXIS_TOLERANCE).any():
-            raise InputError(f"joint_axis has lengths {length}: expected unit vectors")
+            raise KernelError(f"joint_axis has lengths {length}: expected unit vectors")
         object.__setattr__(self, "robot", robot)
         object.__setattr__(
             self, "base_pose", data.pose(identity if base_pose is None else base_pose, "base_pose")
@@ -55,7 +55,7 @@ class Chain:
         return len(self.joint_axis)
 
     def checked(self, q: ArrayLike, name: str = "q") -> FloatArray:
-        """`q` as (N, n) finite joint values, or InputError naming it."""
+        """`q` as (N, n) finite joint values, or KernelError naming it."""
         return data.array(q, name, (None, self.n))
 
     def link_poses(self, q: ArrayLike) -> FloatArray:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ir_kernels import compiled, data
 from ir_kernels.chain import Chain
 from ir_kernels.data import BodyLike, CapsuleLike
-from ir_kernels.errors import InputError
+from ir_kernels.errors import KernelError
 from ir_kernels.geometry import COLLIDES, FREE, UNDECIDED, Geometry, Pair, geometry
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
@@ -86,7 +86,7 @@ class CollisionModel:
     Pairs: every capsule with every body (capsule by capsule), but those of link 0 (nothing of them
     moves) and those in `ignored_pairs`; then `self_pairs` of capsules. All by name. Immutable:
     build another one when a door opens or a load is attached (about a millisecond). Raises
-    InputError for data that make no sense.
+    KernelError for data that make no sense.
     """
 
     def __init__(
@@ -107,11 +107,11 @@ class CollisionModel:
         """`value` for every pair: one number, or (Z,); -inf is allowed, NaN and +inf aren't."""
         values = np.asarray(value, dtype=np.float64)
         if values.shape not in ((), (len(self.pairs),)):
-            raise InputError(
+            raise KernelError(
                 f"{name} has shape {values.shape}: expected one number or ({len(self.pairs)},)"
             )
         if not (values < np.inf).all():
-            raise InputError(
+            raise KernelError(
                 f"{name} holds nan or +inf: expected lengths in m, or -inf to ignore a pair"
             )
         return np.ascontiguousarray(values) if values.ndim else np.full(len(self.pairs), values)
@@ -179,7 +179,7 @@ class CollisionModel:
         start = self.chain.checked(q0, "q0")
         goal = self.chain.checked(q1, "q1")
         if len(start) != len(goal):
-            raise InputError(f"q1 has {len(goal)} rows: expected {len(start)} as q0")
+            raise KernelError(f"q1 has {len(goal)} rows: expected {len(start)} as q0")
         limit = self._per_pair(threshold, "threshold")
         return Certificates(*self._core.certify_edges(start, goal, limit))
 
@@ -195,7 +195,7 @@ class CollisionModel:
         c = data.array(coefficients, "coefficients", (None, self.chain.n, None))
         span = data.array(durations, "durations", (len(c),))
         if (span < 0.0).any():
-            raise InputError(f"durations holds {span.min()} s: expected at least 0")
+            raise KernelError(f"durations holds {span.min()} s: expected at least 0")
         limit = self._per_pair(threshold, "threshold")
         verdict, begin, end, pair, bound = self._core.certify_trajectory(c, span, limit)
         return Certificate(verdict, (begin, end), pair, bound)

@@ -10,14 +10,14 @@ from __future__ import annotations
 import numpy as np
 
 from ir_kernels import portable
-from ir_kernels.errors import InputError
+from ir_kernels.errors import KernelError
 from ir_values.arrays import FloatArray
 
 
 class Coupling:
     """How the motors of n joints turn with them; turns (n, n): rows are motors, columns joints.
 
-    Arrays (..., n) in and out; without a coupling they come back as they are. Raises InputError
+    Arrays (..., n) in and out; without a coupling they come back as they are. Raises KernelError
     where joints do not follow from motors.
     """
 
@@ -28,9 +28,11 @@ class Coupling:
         try:
             self.inverse = portable.inv(self.turns) if self.coupled else np.eye(n)
         except np.linalg.LinAlgError as error:
-            raise InputError("motor_turns is singular: joints do not follow from motors") from error
+            raise KernelError(
+                "motor_turns is singular: joints do not follow from motors"
+            ) from error
         if not np.isfinite(self.inverse).all():
-            raise InputError("motor_turns: joints do not follow from motors")
+            raise KernelError("motor_turns: joints do not follow from motors")
         for array in (self.turns, self.inverse):
             array.setflags(write=False)
 

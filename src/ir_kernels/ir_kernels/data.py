@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ir_kernels import arguments, portable
-from ir_kernels.errors import InputError
+from ir_kernels.errors import KernelError
 from ir_values.arrays import FloatArray, IntArray
 
 T = TypeVar("T", bound=np.generic)
@@ -90,7 +90,7 @@ def read_only(array: NDArray[T]) -> NDArray[T]:
 
 
 def array(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> FloatArray:
-    """`value` as a finite, C-contiguous float64 array of `shape`, or InputError.
+    """`value` as a finite, C-contiguous float64 array of `shape`, or KernelError.
 
     None in the shape is any length but 0: (None, 3) for (N, 3).
     """
@@ -98,15 +98,15 @@ def array(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> FloatAr
 
 
 def indices(value: ArrayLike, name: str, shape: tuple[int | None, ...], bound: int) -> IntArray:
-    """`value` as an int64 array of `shape`, such as (n,), with 0 <= i < bound, or InputError naming
-    it.
+    """`value` as an int64 array of `shape`, such as (n,), with 0 <= i < bound, or KernelError
+    naming it.
     """
     raw = np.asarray(value)
     if raw.dtype.kind not in "iu":
-        raise InputError(f"{name} has dtype {raw.dtype}, expected whole numbers")
+        raise KernelError(f"{name} has dtype {raw.dtype}, expected whole numbers")
     arguments.shaped(name, raw, *shape)
     if raw.min() < 0 or raw.max() >= bound:
-        raise InputError(f"{name} holds {raw.min()}..{raw.max()}: expected 0 <= index < {bound}")
+        raise KernelError(f"{name} holds {raw.min()}..{raw.max()}: expected 0 <= index < {bound}")
     return np.ascontiguousarray(raw, dtype=np.int64)
 
 
@@ -128,19 +128,19 @@ def poses(value: ArrayLike, name: str) -> FloatArray:
         initial=0.0
     )
     if deviation > ROTATION_TOLERANCE or (result[:, 3] != [0.0, 0.0, 0.0, 1.0]).any():
-        raise InputError(
+        raise KernelError(
             f"{name} is not a rigid transform: R R^T deviates from 1 by {deviation:.2g}, "
             "or the last row isn't 0 0 0 1"
         )
     if (np.linalg.det(rotation) < 0.0).any():
-        raise InputError(f"{name} mirrors: its rotation has determinant -1")
+        raise KernelError(f"{name} mirrors: its rotation has determinant -1")
     return result
 
 
 def unique_names(items: Sequence[CapsuleLike] | Sequence[BodyLike], name: str) -> tuple[str, ...]:
-    """Names of the items; InputError when one is used twice."""
+    """Names of the items; KernelError when one is used twice."""
     names = tuple(str(item.name) for item in items)
     if len(set(names)) < len(names):
         twice = next(one for k, one in enumerate(names) if one in names[:k])
-        raise InputError(f"{name}: the name {twice!r} is used more than once")
+        raise KernelError(f"{name}: the name {twice!r} is used more than once")
     return names

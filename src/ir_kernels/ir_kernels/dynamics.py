@@ -22,7 +22,7 @@ from ir_kernels.dynamics_data import (
     RobotLike,
     dynamics_data,
 )
-from ir_kernels.errors import InputError
+from ir_kernels.errors import KernelError
 from ir_kernels.limits import segments
 from ir_kernels.reference import dynamics as reference
 from ir_kernels.reference import enclosures
@@ -112,7 +112,7 @@ class DynamicsModel:
     the world.
 
     The world's z points up. Torques are those of the motors seen at the joint, Nm. Every method
-    takes and returns C-contiguous (N, n) float64 arrays, N >= 1, and raises InputError naming the
+    takes and returns C-contiguous (N, n) float64 arrays, N >= 1, and raises KernelError naming the
     argument that is not.
     """
 
@@ -249,11 +249,11 @@ class DynamicsModel:
         coefficients (S, n, d + 1), d <= 7, lowest power first in the local time of each segment;
         durations (S,) s. Interval arithmetic over pieces of time that are halved until upper -
         sampled <= `tolerance` and every joint is decided, or `max_intervals` pieces are spent.
-        Raises InputError.
+        Raises KernelError.
         """
         c, T = self._motion(coefficients, durations)
         if not tolerance > 0.0:
-            raise InputError(f"tolerance is {tolerance}: it has to be above 0")
+            raise KernelError(f"tolerance is {tolerance}: it has to be above 0")
         if self._core is None:
             return torque_bounds(
                 *enclosures.torque_bounds(self.data, c, T, tolerance, max_intervals)
@@ -267,11 +267,11 @@ class DynamicsModel:
         interval arithmetic over pieces of at most `longest` s; half as long a piece leaves a fourth
         of the excess.
 
-        coefficients (S, n, d + 1), d <= 7; durations (S,) s. Raises InputError.
+        coefficients (S, n, d + 1), d <= 7; durations (S,) s. Raises KernelError.
         """
         c, T = self._motion(coefficients, durations)
         if not longest > 0.0:
-            raise InputError(f"longest is {longest} s: it has to be above 0")
+            raise KernelError(f"longest is {longest} s: it has to be above 0")
         if self._core is None:
             return power_bounds(*enclosures.power_bounds(self.data, c, T, longest))
         return power_bounds(*self._core.power_bounds(c, T, longest))
@@ -281,7 +281,7 @@ class DynamicsModel:
     ) -> tuple[FloatArray, FloatArray]:
         c, T = segments(coefficients, durations)
         if c.shape[1] != self.n or not 1 <= c.shape[2] <= MAX_TERMS:
-            raise InputError(
+            raise KernelError(
                 f"coefficients has shape {c.shape}, expected (S, {self.n}, 1..{MAX_TERMS})"
             )
         return c, T

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ir_kernels import portable
 from ir_kernels.coupling import Coupling
 from ir_kernels.data import ChainLike
-from ir_kernels.errors import InputError
+from ir_kernels.errors import KernelError
 from ir_values.arrays import FloatArray
 
 # What the dynamics need to know of a robot and its loads: structural types, for n joints.
@@ -198,9 +198,9 @@ class DynamicsData:
 def _frozen(name: str, value: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
     array = np.array(value, dtype=np.float64)
     if array.shape != shape:
-        raise InputError(f"{name} has shape {array.shape}, expected {shape}")
+        raise KernelError(f"{name} has shape {array.shape}, expected {shape}")
     if not np.isfinite(array).all():
-        raise InputError(f"{name} holds a value that is not finite")
+        raise KernelError(f"{name} holds a value that is not finite")
     array.setflags(write=False)
     return array
 
@@ -217,7 +217,7 @@ def lump(
     inertias = [np.asarray(inertia, float), *(np.asarray(load.inertia, float) for load in loads)]
     for load, own in zip(loads, masses[1:], strict=True):
         if not (np.isfinite(own) and own >= 0.0):
-            raise InputError(
+            raise KernelError(
                 f"load {load.name!r} has a mass of {own} kg: it has to be finite and not negative"
             )
     total = sum(masses)
@@ -246,7 +246,7 @@ def _counterbalance(data: CounterbalanceLike | None) -> CounterbalanceData | Non
     )
     longest = float(portable.hypot(*packed.pivot) + portable.hypot(*packed.rod_eye))
     if packed.gas_volume - packed.piston_area * (longest - packed.rod_length_at_charge) <= 0.0:
-        raise InputError(
+        raise KernelError(
             f"counterbalance: at its longest ({longest:.3f} m) the rod leaves no volume for the "
             f"gas ({packed.gas_volume} m^3 at {packed.rod_length_at_charge} m)"
         )
@@ -263,14 +263,14 @@ def dynamics_data(
     """Pack a robot, its loads and its mounting.
 
     `base_pose` (4, 4): pose of link 0 in the world, whose z points up. `gravity` [m/s^2]. Raises
-    InputError.
+    KernelError.
     """
     n = len(robot.joint_axis)
     mass = np.array(robot.link_mass[1:], float)
     com = np.array(robot.link_com[1:], float)
     inertia = np.array(robot.link_inertia[1:], float)
     if mass.shape != (n,) or (mass < 0.0).any():
-        raise InputError(f"robot.link_mass has to be {n + 1} masses in kg, none negative")
+        raise KernelError(f"robot.link_mass has to be {n + 1} masses in kg, none negative")
     mass[-1], com[-1], inertia[-1] = lump(mass[-1], com[-1], inertia[-1], loads)
     pose = _frozen("base_pose", base_pose, (4, 4))
     knots = np.shape(robot.envelope_speed)[-1]
@@ -297,9 +297,11 @@ def dynamics_data(
         ),
     )
     if (data.gear_ratio == 0.0).any():
-        raise InputError("robot.gear_ratio holds a zero")
+        raise KernelError("robot.gear_ratio holds a zero")
     if (np.diff(data.envelope_speed, axis=1) <= 0.0).any() or (data.envelope_speed < 0.0).any():
-        raise InputError("robot.envelope_speed has to grow from speed to speed and not be negative")
+        raise KernelError(
+            "robot.envelope_speed has to grow from speed to speed and not be negative"
+        )
     if (data.envelope_torque <= 0.0).any():
-        raise InputError("robot.envelope_torque has to be positive")
+        raise KernelError("robot.envelope_torque has to be positive")
     return data

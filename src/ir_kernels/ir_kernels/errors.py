@@ -1,14 +1,5 @@
-"""Errors of the kernels.
-
-KernelError
-└── InputError (also a ValueError): an argument has the wrong shape, type or value; the message
-names it
-"""
+"""The error of the kernels."""
 
 
-class KernelError(Exception):
-    """Root of everything that ir_kernels raises."""
-
-
-class InputError(KernelError, ValueError):
+class KernelError(ValueError):
     """An argument makes no sense: the message names it, what it is and what it has to be."""

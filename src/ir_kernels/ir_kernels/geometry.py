@@ -11,7 +11,7 @@ import numpy as np
 from ir_kernels import data
 from ir_kernels.chain import Chain
 from ir_kernels.data import BodyLike, CapsuleLike
-from ir_kernels.errors import InputError
+from ir_kernels.errors import KernelError
 from ir_values.arrays import FloatArray, IntArray
 
 # What a proof of motion can end in.
@@ -67,7 +67,7 @@ class Scene:
 
 
 def hull(vertices: FloatArray, name: str) -> Hull:
-    """Convex hull of `vertices` (V, 3). InputError for fewer than four or for points that span no
+    """Convex hull of `vertices` (V, 3). KernelError for fewer than four or for points that span no
     volume.
     """
     from scipy.spatial import ConvexHull, QhullError  # only scenes with meshes pay for this import
@@ -76,7 +76,7 @@ def hull(vertices: FloatArray, name: str) -> Hull:
         found = ConvexHull(vertices)
     except (QhullError, ValueError) as error:
         reason = str(error).strip().splitlines()[0]
-        raise InputError(
+        raise KernelError(
             f"{name}: {len(vertices)} vertices have no convex hull with a volume: {reason}"
         ) from error
     corners = vertices[found.vertices]
@@ -95,7 +95,7 @@ def _size(body: BodyLike, name: str) -> FloatArray:
     if (size[:used] <= 0.0).any() and not (
         body.kind == "capsule" and size[0] > 0.0 and size[1] == 0.0
     ):
-        raise InputError(
+        raise KernelError(
             f"{name}.size is {size.tolist()} m: a {body.kind} needs {used} positive lengths"
         )
     return size
@@ -106,16 +106,16 @@ def _poses(bodies: Sequence[BodyLike]) -> FloatArray:
     stacked = np.array([body.pose for body in bodies], dtype=np.float64).reshape(-1, 4, 4)
     try:
         return data.poses(stacked, "bodies") if len(bodies) else stacked
-    except InputError:
+    except KernelError:
         return np.array([data.pose(body.pose, f"body {body.name!r}.pose") for body in bodies])
 
 
 def scene(bodies: Sequence[BodyLike]) -> Scene:
-    """The bodies as arrays, checked: InputError names the body and what is wrong with it."""
+    """The bodies as arrays, checked: KernelError names the body and what is wrong with it."""
     names = data.unique_names(bodies, "bodies")
     for body in bodies:
         if body.kind not in KINDS:
-            raise InputError(
+            raise KernelError(
                 f"body {body.name!r} is a {body.kind!r}: known kinds are {', '.join(KINDS)}"
             )
     hulls = []
@@ -186,9 +186,9 @@ def capsules(items: Sequence[CapsuleLike], n: int) -> Capsules:
     for item in items:
         label = f"capsule {item.name!r}"
         if not 0 <= item.link <= n:
-            raise InputError(f"{label} is on link {item.link}: the chain has links 0 to {n}")
+            raise KernelError(f"{label} is on link {item.link}: the chain has links 0 to {n}")
         if not (np.isfinite(item.radius) and item.radius >= 0.0):
-            raise InputError(
+            raise KernelError(
                 f"{label} has radius {item.radius} m: expected a finite length of at least 0"
             )
     ends = [
@@ -209,7 +209,7 @@ def capsules(items: Sequence[CapsuleLike], n: int) -> Capsules:
 def _known(name: str, names: Sequence[str], argument: str) -> None:
     if name not in names:
         listed = ", ".join(list(names)[:40]) or "none"
-        raise InputError(f"{argument} names {name!r}: known are {listed}")
+        raise KernelError(f"{argument} names {name!r}: known are {listed}")
 
 
 def _self_pairs(
@@ -222,7 +222,7 @@ def _self_pairs(
         _known(first, names, "self_pairs")
         _known(second, names, "self_pairs")
         if first == second:
-            raise InputError(
+            raise KernelError(
                 f"self_pairs holds ({first!r}, {second!r}): a capsule has no distance from itself"
             )
         if frozenset((first, second)) not in ignored:
@@ -241,7 +241,7 @@ def geometry(
 
     Every capsule meets every body, but capsules of link 0 (they don't move: the cell's business)
     and the pairs in `ignored_pairs` (capsule and body in either order; also of self pairs). Raises
-    InputError for unknown names.
+    KernelError for unknown names.
     """
     robot = capsules(items, chain.n)
     environment = scene(bodies)

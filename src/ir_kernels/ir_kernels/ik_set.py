@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ir_kernels import data, portable
 from ir_kernels.chain import Chain
-from ir_kernels.errors import InputError
+from ir_kernels.errors import KernelError
 from ir_kernels.reference.inverse_kinematics import LIMIT_TOLERANCE
 from ir_values.arrays import FloatArray, IntArray
 
@@ -75,14 +75,14 @@ def turns_of_all(angles: FloatArray, low: float, high: float) -> tuple[IntArray,
 
 
 def limits(position_min: ArrayLike, position_max: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Both limits (6,) [rad], checked and read-only. Raises InputError."""
+    """Both limits (6,) [rad], checked and read-only. Raises KernelError."""
     low, high = (
         data.read_only(data.array(np.ascontiguousarray(values), name, (6,)).copy())
         for name, values in (("position_min", position_min), ("position_max", position_max))
     )
     if (low > high).any():
         j = int(np.argmax(low > high))
-        raise InputError(
+        raise KernelError(
             f"position_min[{j}] is {low[j]} rad, above position_max[{j}], {high[j]} rad"
         )
     return low, high

@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from ir_kernels import data, portable
 from ir_kernels.arguments import shaped
 from ir_kernels.chain import Chain
-from ir_kernels.errors import InputError
+from ir_kernels.errors import KernelError
 from ir_kernels.ik_set import Found, IkSet, InverseKinematics, limits, newton, polished, with_turns
 from ir_kernels.shoulder_wrist import shoulder_and_wrist
 from ir_kernels.spherical_wrist import SphericalWristIk
@@ -32,14 +32,14 @@ class ThreeParallelIk:
 
     Where axis 6 is parallel to axes 2 to 4 one parameter is free: the representative with q6 = 0
     (or the limit nearest to 0) is given, or where the arm does not reach so the next in steps of 15
-    deg. Raises InputError where axes 2, 3 and 4 are not parallel (1e-9).
+    deg. Raises KernelError where axes 2, 3 and 4 are not parallel (1e-9).
     """
 
     def __init__(self, chain: Chain, position_min: ArrayLike, position_max: ArrayLike) -> None:
         self.chain = chain
         self.lines = arm_lines(chain)
         if not self.lines.parallel(3):
-            raise InputError("axes 2, 3 and 4 are not parallel")
+            raise KernelError("axes 2, 3 and 4 are not parallel")
         self.position_min, self.position_max = limits(position_min, position_max)
 
     def solve(self, poses: ArrayLike) -> IkSet:
@@ -211,7 +211,7 @@ class SearchedIk:
     """All configurations within position_min, position_max (6,) rad that bring `chain`'s tcp to a
     pose.
 
-    branch: 0, 1, .. in the order of q. grid: values of q4 that are tried. Raises InputError where
+    branch: 0, 1, .. in the order of q. grid: values of q4 that are tried. Raises KernelError where
     axes 2 and 3 are not parallel (1e-9).
     """
 
@@ -372,7 +372,7 @@ def inverse_kinematics(
 ) -> InverseKinematics:
     """All configurations within the limits (6,) rad that bring `chain`'s tcp to a pose.
 
-    Raises InputError for an arm that has not six axes, or whose axes 2 and 3 are not parallel.
+    Raises KernelError for an arm that has not six axes, or whose axes 2 and 3 are not parallel.
     """
     lines = arm_lines(chain)
     if has_spherical_wrist(chain):
@@ -386,6 +386,6 @@ def has_spherical_wrist(chain: Chain) -> bool:
     """Whether the closed form for a spherical wrist serves."""
     try:
         wrist_geometry(chain)
-    except InputError:
+    except KernelError:
         return False
     return True

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ir_kernels import compiled, data, portable
 from ir_kernels.arguments import checked
-from ir_kernels.errors import InputError
+from ir_kernels.errors import KernelError
 from ir_kernels.reference import limits as reference
 from ir_kernels.reference.limits import derivative
 from ir_values.arrays import FloatArray
@@ -50,11 +50,11 @@ class MotionExtrema:
 
 
 def segments(coefficients: ArrayLike, durations: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Coefficients (S, n, d + 1) and durations (S,) checked, or InputError."""
+    """Coefficients (S, n, d + 1) and durations (S,) checked, or KernelError."""
     c = checked("coefficients", coefficients, None, None, None)
     T = checked("durations", durations, len(c))
     if (T <= 0.0).any():
-        raise InputError(
+        raise KernelError(
             f"durations[{int(T.argmin())}] is {T.min()} s: segments have to be longer than 0"
         )
     return c, T
@@ -70,11 +70,11 @@ def polynomial_extrema(
     """Extremes of the `derivative`-th derivative of q(t) = sum_k c_k t^k, t in [0, duration], to
     rounding.
 
-    coefficients (S, n, d + 1), durations (S,) s. Raises InputError.
+    coefficients (S, n, d + 1), durations (S,) s. Raises KernelError.
     """
     c, T = segments(coefficients, durations)
     if derivative < 0:
-        raise InputError(f"derivative is {derivative}: it has to be 0 or more")
+        raise KernelError(f"derivative is {derivative}: it has to be 0 or more")
     for _ in range(derivative):
         c = reference.derivative(c) if c.shape[2] > 1 else 0.0 * c
     if core is None or not hasattr(core, "polynomial_extrema") or c.shape[2] > COMPILED_TERMS:
@@ -135,13 +135,13 @@ def polynomial_samples(
     the beginning of each segment; begins (S,) s rise, durations (S,) s.
 
     At a time that two segments share the later one counts; times before and after are those of the
-    ends. Raises InputError.
+    ends. Raises KernelError.
     """
     c, T = segments(coefficients, durations)
     first = checked("begins", begins, len(c))
     at = checked("times", times, None)
     if (np.diff(first) <= 0.0).any():
-        raise InputError("begins have to rise")
+        raise KernelError("begins have to rise")
     if core is not None and hasattr(core, "polynomial_samples"):
         found: Motion = core.polynomial_samples(c, T, first, at)
         return found

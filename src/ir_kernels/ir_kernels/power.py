@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ir_kernels import compiled, portable
 from ir_kernels.arguments import checked, finite
-from ir_kernels.errors import InputError
+from ir_kernels.errors import KernelError
 from ir_kernels.reference import dynamics as reference
 from ir_values.arrays import FloatArray
 
@@ -37,11 +37,11 @@ class DcBusParameters:
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.capacity_energy) and self.capacity_energy >= 0.0):
-            raise InputError(
+            raise KernelError(
                 f"capacity_energy is {self.capacity_energy} J: it has to be finite and not negative"
             )
         if self.regeneration not in REGENERATIONS:
-            raise InputError(
+            raise KernelError(
                 f"regeneration is {self.regeneration!r}: known are {', '.join(REGENERATIONS)}"
             )
 
@@ -78,7 +78,7 @@ def _steps(dt: ArrayLike, N: int) -> FloatArray:
         "dt", np.broadcast_to(np.asarray(dt, float), (N,)).copy() if np.ndim(dt) == 0 else dt, N
     )
     if (steps <= 0.0).any():
-        raise InputError(f"dt holds {steps.min()} s: steps have to be longer than 0")
+        raise KernelError(f"dt holds {steps.min()} s: steps have to be longer than 0")
     return steps
 
 
@@ -104,12 +104,12 @@ def dc_bus(
 
     Always mains dt = (sum of axes + dissipated) dt + change of stored, and 0 <= stored <=
     capacity_energy. What is left in the capacitor at the end is not credited to anyone. N may be 1:
-    a driver hands `stored` on from call to call. Raises InputError.
+    a driver hands `stored` on from call to call. Raises KernelError.
     """
     power = checked("axis_power", axis_power, None, None)
     steps = _steps(dt, len(power))
     if not 0.0 <= stored <= parameters.capacity_energy:
-        raise InputError(
+        raise KernelError(
             f"stored is {stored} J: it has to be within 0 and capacity_energy "
             f"{parameters.capacity_energy} J"
         )
@@ -126,7 +126,7 @@ def drive_energy(
     """Drive energy of N steps with constant axis powers (N, n) W; the base load of the controller
     is not in it.
 
-    Sample the power at the middles of the steps and the error falls with dt^2. Raises InputError.
+    Sample the power at the middles of the steps and the error falls with dt^2. Raises KernelError.
     """
     power = checked("axis_power", axis_power, None, None)
     steps = _steps(dt, len(power))

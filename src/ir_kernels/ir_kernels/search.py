@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ir_kernels import compiled
 from ir_kernels.arguments import checked
 from ir_kernels.collision import CollisionModel
-from ir_kernels.errors import InputError
+from ir_kernels.errors import KernelError
 from ir_values.arrays import FloatArray
 
 
@@ -31,7 +31,7 @@ class BidirectionalTree:
     Work is counted in certified edges; sixteen configurations that are only looked at count as one.
     Different objects may be grown in different threads at once.
 
-    Raises InputError for arguments that make no sense, among them a start that isn't free, and
+    Raises KernelError for arguments that make no sense, among them a start that isn't free, and
     goals none of which is. A goal that isn't free, while another one is, is never reached.
     """
 
@@ -54,14 +54,14 @@ class BidirectionalTree:
         least = checked("low", low, n)
         most = checked("high", high, n)
         if (least > most).any():
-            raise InputError(
+            raise KernelError(
                 f"low is {least[least > most][0]} where high is {most[least > most][0]} rad"
             )
         weights = checked("scale", scale, n)
         if (weights <= 0.0).any():
-            raise InputError(f"scale holds {weights.min()}: expected more than 0")
+            raise KernelError(f"scale holds {weights.min()}: expected more than 0")
         if not 0 <= seed < 2**64:
-            raise InputError(f"seed is {seed}: expected at least 0 and less than 2^64")
+            raise KernelError(f"seed is {seed}: expected at least 0 and less than 2^64")
         limits = collision._per_pair(threshold, "threshold")
         first = checked("start", start, n)
         last = checked("goals", goals, None, n)
@@ -76,9 +76,9 @@ class BidirectionalTree:
             _within(name, rows, least, most)
         free = collision.is_free(np.concatenate([first[None], last]), limits)
         if not free[0]:
-            raise InputError("start is not free: a pair is not farther apart than its threshold")
+            raise KernelError("start is not free: a pair is not farther apart than its threshold")
         if not free[1:].any():
-            raise InputError("goals holds no configuration that is free")
+            raise KernelError("goals holds no configuration that is free")
         core = _core()
         self._search = core(
             collision._core, first, last, limits, least, most, weights, int(seed), line, lines
@@ -87,10 +87,10 @@ class BidirectionalTree:
     def grow(self, max_edges: int) -> bool:
         """Search on, for at most so many certified edges; whether a path has been found.
 
-        Raises InputError where max_edges is negative.
+        Raises KernelError where max_edges is negative.
         """
         if max_edges < 0:
-            raise InputError(f"max_edges is {max_edges}: expected at least 0")
+            raise KernelError(f"max_edges is {max_edges}: expected at least 0")
         return bool(self._search.grow(min(int(max_edges), 2**62)))
 
     @property
@@ -145,7 +145,7 @@ def _goal_lines(given: Sequence[ArrayLike] | None, goals: int, n: int) -> list[F
     """A line (M, n) for each goal, empty where none is given."""
     lines = [np.empty((0, n))] * goals if given is None else list(given)
     if len(lines) != goals:
-        raise InputError(f"goal_lines has {len(lines)} lines: expected {goals}, one per goal")
+        raise KernelError(f"goal_lines has {len(lines)} lines: expected {goals}, one per goal")
     return [_line(f"goal_lines[{g}]", value, n) for g, value in enumerate(lines)]
 
 
@@ -156,10 +156,10 @@ def _line(name: str, value: ArrayLike, n: int) -> FloatArray:
 
 
 def _within(name: str, rows: FloatArray, low: FloatArray, high: FloatArray) -> None:
-    """Raise InputError for configurations (M, n) outside the limits."""
+    """Raise KernelError for configurations (M, n) outside the limits."""
     outside = np.argwhere((rows < low) | (rows > high))
     if len(outside):
         k, j = outside[0]
-        raise InputError(
+        raise KernelError(
             f"{name} has joint {j} at {rows[k, j]} rad: expected {low[j]} to {high[j]} rad"
         )

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from ir_kernels import arguments, compiled, data
 from ir_kernels.collision import CollisionModel, core_of
 from ir_kernels.dynamics import DynamicsModel
-from ir_kernels.errors import InputError
+from ir_kernels.errors import KernelError
 from ir_kernels.reference.descent import descend_along, descend_profile
 from ir_kernels.spline_terms import SplineTerms, checked_terms
 from ir_values.arrays import FloatArray
@@ -99,7 +99,7 @@ class SplineDescent:
 class SplineCost:
     """Cost of motions of one robot with its load in one scene, and the descent on it. Immutable.
 
-    Raises InputError for terms that make no sense, and for a chain that isn't the one of the
+    Raises KernelError for terms that make no sense, and for a chain that isn't the one of the
     dynamics. Several threads may use one object at once; the compiled core doesn't hold up others.
     """
 
@@ -135,7 +135,7 @@ class SplineCost:
         """Cost and derivatives of a spline (K, n), K >= 4; row (K - 3,): of the thresholds, None:
         the first.
 
-        Raises InputError. Numbers so large that the cost overflows make it inf or nan.
+        Raises KernelError. Numbers so large that the cost overflows make it inf or nan.
         """
         points, rows = self._checked(control, row, 4)
         seconds = arguments.number("interval", interval, 0.0, above=True)
@@ -157,7 +157,7 @@ class SplineCost:
 
         L-BFGS with a metric in which bending counts; the interval changes too unless
         `fixed_interval`. Ends after `evaluations`, or when ten steps gain less than `tolerance` of
-        the cost; at once where the cost is not finite. Deterministic. Raises InputError.
+        the cost; at once where the cost is not finite. Deterministic. Raises KernelError.
         """
         points, rows = self._checked(control, row, 7)
         seconds = arguments.number("interval", interval, 0.0, above=True)
@@ -178,12 +178,12 @@ class SplineCost:
     ) -> list[SplineDescent]:
         """The same from splines from rest to rest along paths (M, n), M >= 2, that go somewhere;
         with the first row of thresholds. The control points found stay within the joints' ranges.
-        Raises InputError.
+        Raises KernelError.
         """
         checked = [data.array(path, "path", (None, self.n)) for path in paths]
         for path in checked:
             if len(path) < 2 or (path == path[0]).all():
-                raise InputError(
+                raise KernelError(
                     "a path has no length: expected two or more configurations that differ"
                 )
         if not checked:
@@ -217,13 +217,13 @@ class SplineCost:
     ) -> ProfileDescent:
         """Descend by where a path is passed at the inner knots of a spline, s (C,), C >= 4, and by
         its duration [s]; with the first row of thresholds. L-BFGS in a metric in which the jerk of
-        s counts. Raises InputError.
+        s counts. Raises KernelError.
         """
         breaks = data.array(path.breaks, "path.breaks", (None,))
         cubics = data.array(path.cubics, "path.cubics", (4, len(breaks) - 1, self.n))
         places = data.array(s, "s", (None,))
         if len(places) < 4:
-            raise InputError(f"s has {len(places)} places: expected at least 4")
+            raise KernelError(f"s has {len(places)} places: expected at least 4")
         seconds = arguments.number("duration", duration, 0.0, above=True)
         gain = arguments.number("tolerance", tolerance, 0.0)
         most = _most(evaluations)
@@ -237,7 +237,7 @@ class SplineCost:
     ) -> tuple[FloatArray, RowArray]:
         points = data.array(control, "control", (None, self.n))
         if len(points) < fewest:
-            raise InputError(
+            raise KernelError(
                 f"control has shape {points.shape}: expected (K, {self.n}) with K >= {fewest}"
             )
         count = len(points) - 3
@@ -252,16 +252,16 @@ def _most(evaluations: int) -> int:
         or not isinstance(evaluations, int | np.integer)
         or evaluations < 1
     ):
-        raise InputError(f"evaluations is {evaluations!r}: expected a whole number of at least 1")
+        raise KernelError(f"evaluations is {evaluations!r}: expected a whole number of at least 1")
     return min(int(evaluations), MOST_EVALUATIONS)
 
 
 def _same_chain(collision: CollisionModel, dynamics: DynamicsModel) -> None:
-    """Raise InputError unless both models are of one chain."""
+    """Raise KernelError unless both models are of one chain."""
     chain = collision.chain
     other = dynamics.data
     if chain.n != other.n:
-        raise InputError(
+        raise KernelError(
             f"collision has {chain.n} joints, dynamics {other.n}: expected models of one robot"
         )
     off = max(
@@ -269,7 +269,7 @@ def _same_chain(collision: CollisionModel, dynamics: DynamicsModel) -> None:
         float(np.abs(chain.joint_axis - other.axis).max()),
     )
     if off > SAME_CHAIN:
-        raise InputError(
+        raise KernelError(
             f"the chains of collision and dynamics differ by {off:.2g}: expected models of one "
             "robot"
         )

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ir_kernels import arguments, data
-from ir_kernels.errors import InputError
+from ir_kernels.errors import KernelError
 from ir_kernels.power import REGENERATIONS, Regeneration
 from ir_values.arrays import FloatArray
 
@@ -70,23 +70,23 @@ def _copy(value: ArrayLike) -> ArrayLike:
 
 
 def _check_bounds(arrays: dict[str, FloatArray]) -> None:
-    """Raise InputError for bounds that no motion can keep."""
+    """Raise KernelError for bounds that no motion can keep."""
     for name in ("velocity", "acceleration", "jerk"):
         if (arrays[name] <= 0.0).any():
-            raise InputError(f"terms.{name} holds {arrays[name].min()}: bounds have to be above 0")
+            raise KernelError(f"terms.{name} holds {arrays[name].min()}: bounds have to be above 0")
     if (arrays["low"] > arrays["high"]).any():
         j = int(np.argmax(arrays["low"] > arrays["high"]))
-        raise InputError(
+        raise KernelError(
             f"terms.low[{j}] is {arrays['low'][j]}, above terms.high[{j}] {arrays['high'][j]}"
         )
     if (arrays["travel"] < 0.0).any():
-        raise InputError(
+        raise KernelError(
             f"terms.travel holds {arrays['travel'].min()}: a cost per rad can't be negative"
         )
 
 
 def checked_terms(terms: SplineTerms, n: int, pairs: int) -> SplineTerms:
-    """The terms as contiguous arrays and floats, or InputError naming the one that makes no
+    """The terms as contiguous arrays and floats, or KernelError naming the one that makes no
     sense.
     """
     names = ("velocity", "acceleration", "jerk", "low", "high", "travel")
@@ -95,7 +95,7 @@ def checked_terms(terms: SplineTerms, n: int, pairs: int) -> SplineTerms:
     }
     _check_bounds(arrays)
     if terms.regeneration not in REGENERATIONS:
-        raise InputError(
+        raise KernelError(
             f"terms.regeneration is {terms.regeneration!r}: known are {', '.join(REGENERATIONS)}"
         )
     numbers: dict[str, float] = {
@@ -131,12 +131,12 @@ def checked_terms(terms: SplineTerms, n: int, pairs: int) -> SplineTerms:
 
 
 def _unit(value: ArrayLike, name: str) -> FloatArray:
-    """A direction (3,) of length 1. Raises InputError."""
+    """A direction (3,) of length 1. Raises KernelError."""
     direction = data.array(_copy(value), name, (3,))
     x, y, z = direction.tolist()
     length = math.sqrt(x * x + y * y + z * z)
     if abs(length - 1.0) > _UNIT:
-        raise InputError(f"{name} has length {length}: expected 1")
+        raise KernelError(f"{name} has length {length}: expected 1")
     return direction
 
 
@@ -146,11 +146,11 @@ def _thresholds(value: ArrayLike, pairs: int) -> FloatArray:
     if pairs == 0:
         rows = np.shape(value)
         if len(rows) != 2 or rows[0] == 0 or rows[1] != 0:
-            raise InputError(f"{name} has shape {rows}: expected (R, 0), there are no pairs")
+            raise KernelError(f"{name} has shape {rows}: expected (R, 0), there are no pairs")
         return np.zeros(rows)
     limits = arguments.shaped(name, _copy(value), None, pairs)
     if np.isnan(limits).any() or (limits == np.inf).any():
-        raise InputError(
+        raise KernelError(
             f"{name} holds nan or +inf: expected lengths in m, or -inf to ignore a pair"
         )
     return limits

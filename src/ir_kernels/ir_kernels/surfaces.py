@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ir_kernels import compiled, data
-from ir_kernels.errors import InputError
+from ir_kernels.errors import KernelError
 from ir_values.arrays import BoolArray, FloatArray
 
 
@@ -18,13 +18,13 @@ class Surface:
     """
 
     def __init__(self, triangles: FloatArray, beside: FloatArray) -> None:
-        """Raises InputError for arrays of another shape, or values that are not finite."""
+        """Raises KernelError for arrays of another shape, or values that are not finite."""
         if triangles.shape != (len(beside), 3, 3):
-            raise InputError(
+            raise KernelError(
                 f"triangles has shape {triangles.shape}: expected ({len(beside)}, 3, 3) as beside"
             )
         if not (np.isfinite(triangles).all() and np.isfinite(beside).all()):
-            raise InputError("triangles or beside are not finite")
+            raise KernelError("triangles or beside are not finite")
         self._core = core_of(triangles, beside, compiled.MODULE)
 
     def meets(

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from ir_kernels import data, geometry
 from ir_kernels.chain import Chain
 from ir_kernels.data import CapsuleLike
-from ir_kernels.errors import InputError
+from ir_kernels.errors import KernelError
 from ir_kernels.geometry import COLLIDES, FREE, UNDECIDED
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
@@ -61,7 +61,7 @@ class SweptArm:
         c = data.array(coefficients, "coefficients", (None, chain.n, None))
         span = data.array(durations, "durations", (len(c),))
         if len(c) == 0 or (span < 0.0).any():
-            raise InputError("durations must be at least one, and none of them negative")
+            raise KernelError("durations must be at least one, and none of them negative")
         self._motion = certify.Polynomials(c, span)
         self._begins = np.concatenate([[0.0], np.cumsum(span)])
         self._rows = np.arange(len(c))

@@ -14,7 +14,7 @@ import numpy as np
 
 from ir_kernels import portable
 from ir_kernels.chain import Chain
-from ir_kernels.errors import InputError
+from ir_kernels.errors import KernelError
 from ir_kernels.reference.chain import axis_rotation
 from ir_values.arrays import FloatArray
 
@@ -56,9 +56,9 @@ class ArmLines:
 
 
 def arm_lines(chain: Chain) -> ArmLines:
-    """The lines of a chain. InputError names what no method here solves."""
+    """The lines of a chain. KernelError names what no method here solves."""
     if chain.n != 6:
-        raise InputError(f"the arm has {chain.n} axes: inverse kinematics needs 6")
+        raise KernelError(f"the arm has {chain.n} axes: inverse kinematics needs 6")
     frames = (
         portable.matmul(portable.inv(chain.base_pose), chain.link_poses(np.zeros((1, 6)))[0])
     )[1:]
@@ -68,12 +68,12 @@ def arm_lines(chain: Chain) -> ArmLines:
     lines = ArmLines(z, o, frames[5], bool(portable.norm(o[5] - o[4]) < MEETING))
     if not lines.parallel(2):
         sine = float(portable.norm(np.cross(z[1], z[2])))
-        raise InputError(
+        raise KernelError(
             f"axes 2 and 3 are not parallel (|z2 x z3| = {sine:.3g}, at most {PARALLEL:g}): "
             "no inverse kinematics for such an arm"
         )
     if float(portable.norm(np.cross(z[4], z[5]))) < PARALLEL:
-        raise InputError("axes 5 and 6 are parallel: no inverse kinematics for such an arm")
+        raise KernelError("axes 5 and 6 are parallel: no inverse kinematics for such an arm")
     return lines
 
 
@@ -115,13 +115,13 @@ class WristGeometry:
 
 
 def _meeting_point(o: FloatArray, z: FloatArray) -> FloatArray:
-    """Point nearest to the three lines, or InputError when it isn't on each of them."""
+    """Point nearest to the three lines, or KernelError when it isn't on each of them."""
     normal = np.eye(3) - z[:, :, None] * z[:, None, :]
     feet = np.einsum("kij,kj->ki", normal, o)
     point = portable.least_squares(normal.reshape(-1, 3), feet.reshape(-1, 1))[:, 0]
     miss = float(np.linalg.norm(np.einsum("kij,kj->ki", normal, point - o), axis=1).max())
     if miss > POINT_TOLERANCE:
-        raise InputError(
+        raise KernelError(
             f"chain: the wrist is not spherical, its axes miss a common point by {miss:.3g} m "
             f"(at most {POINT_TOLERANCE} m)"
         )
@@ -129,7 +129,7 @@ def _meeting_point(o: FloatArray, z: FloatArray) -> FloatArray:
 
 
 def _check_axes(z: FloatArray) -> None:
-    """Raise InputError where the directions (6, 3) of the axes are not those of the closed form."""
+    """KernelError where the directions (6, 3) of the axes are not those of the closed form."""
     conditions: dict[str, float] = {
         "axes 1 and 2 are not perpendicular: z1.z2": float(portable.matmul(z[0], z[1])),
         "axes 2 and 3 are not parallel: |z2 x z3|": portable.norm(np.cross(z[1], z[2])),
@@ -138,15 +138,15 @@ def _check_axes(z: FloatArray) -> None:
     }
     for sentence, value in conditions.items():
         if abs(value) > ANGLE_TOLERANCE:
-            raise InputError(f"chain: {sentence} = {value:.3g} (at most {ANGLE_TOLERANCE})")
+            raise KernelError(f"chain: {sentence} = {value:.3g} (at most {ANGLE_TOLERANCE})")
 
 
 def wrist_geometry(chain: Chain) -> WristGeometry:
-    """Derive the constants of `chain`; InputError names the condition that it breaks, with the
+    """Derive the constants of `chain`; KernelError names the condition that it breaks, with the
     value.
     """
     if chain.n != 6:
-        raise InputError(f"chain has {chain.n} joints, the closed form needs 6")
+        raise KernelError(f"chain has {chain.n} joints, the closed form needs 6")
     to_base = portable.inv(chain.base_pose)
     links = portable.matmul(to_base, chain.link_poses(np.zeros((1, 6)))[0])
     frames = links[1:]
@@ -166,7 +166,7 @@ def wrist_geometry(chain: Chain) -> WristGeometry:
     upper_arm = planar(o[2] - o[1])
     forearm = planar(centre - o[2])
     if abs(upper_arm) < POINT_TOLERANCE or abs(forearm) < POINT_TOLERANCE:
-        raise InputError(
+        raise KernelError(
             f"chain: upper arm of {abs(upper_arm):.3g} m or forearm of {abs(forearm):.3g} m "
             "vanishes"
         )

@@ -19,7 +19,7 @@ import numpy as np
 
 from ir_description import Cell, PowerData, cell_hash, is_path
 from ir_description.cell import VIA_TOLERANCE, CellPath, ToolTilt
-from ir_kernels import InputError
+from ir_kernels import KernelError
 from ir_kernels.data import pose as rigid_pose
 from ir_msgs_py.cartesian import CartesianPath
 from ir_msgs_py.options import NO_TILT, PlanOptions
@@ -725,7 +725,7 @@ def _check_pose(goal: Goal) -> None:
     """Raises RequestError where a goal's pose is none."""
     try:
         rigid_pose(np.asarray(goal.pose), "goal")
-    except InputError as error:
+    except KernelError as error:
         raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, str(error)) from error
 
 

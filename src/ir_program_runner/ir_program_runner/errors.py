@@ -1,31 +1,19 @@
-"""Errors of a program that runs, as one tree.
-
-::
-
-    RunnerError
-    ├── ProgramError         a program that must not be started; carries its status code
-    ├── StepFailedError      a step that went wrong while it ran; carries its status
-    └── CanceledError        thrown into a running program: stop, and leave no bit behind
-"""
+"""Errors of a program: not to be started, failed in a step, canceled."""
 
 from __future__ import annotations
 
 from ir_msgs_py.status import Status, StatusCode
 
 
-class RunnerError(Exception):
-    """Root of all errors of this package."""
-
-
-class ProgramError(RunnerError):
-    """A program that makes no sense; nothing has moved."""
+class ProgramError(Exception):
+    """A program that makes no sense, with the code of the answer; nothing has moved."""
 
     def __init__(self, sentence: str, code: StatusCode = StatusCode.INVALID_MOTION_PLAN) -> None:
         super().__init__(sentence)
         self.code = code
 
 
-class StepFailedError(RunnerError):
+class StepFailedError(Exception):
     """A step that did not end well."""
 
     def __init__(self, status: Status) -> None:
@@ -33,5 +21,7 @@ class StepFailedError(RunnerError):
         self.status = status
 
 
-class CanceledError(RunnerError):
-    """Somebody canceled the program; the message describes how it stopped."""
+class CanceledError(Exception):
+    """Thrown into a running program: stop, and leave no bit behind; the message says how it
+    stopped.
+    """

@@ -49,7 +49,7 @@ from ir_program_runner.program import (
 )
 from ir_program_runner.requests import Announce
 from ir_program_runner.settings import LinkSettings, ProgramSettings
-from ir_values.errors import InvalidValueError, ParameterError
+from ir_values.errors import InvalidValueError
 
 # The runner's settings as ROS parameters; none changes while a program runs.
 
@@ -64,8 +64,9 @@ class RunnerParameters:
 
 
 def declare_parameters(node: Node, busy: Callable[[], bool]) -> RunnerParameters:
-    """Declare all; a change while `busy` is refused. Raises ParameterError for a bad value at the
-    start.
+    """Declare all; a change while `busy` is refused.
+
+    Raises InvalidValueError for a bad value at the start.
     """
 
     def refuse(names: tuple[str, ...]) -> str:
@@ -421,7 +422,7 @@ class ProgramRunnerNode(Node):
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the node until it is ended."""
-    refusals = (ParameterError, DescriptionError, ValueError)
+    refusals = (InvalidValueError, DescriptionError, ValueError)
     about = (
         "Runs planned programs: movements, pauses in their power modes, signals of the machines."
     )

@@ -6,7 +6,6 @@
     ├── SettingsError (ValueError)  a setting out of its range
     ├── TrajectoryRefusedError      not executed; code of control_msgs/FollowJointTrajectory
     ├── RequestRefusedError         a request that cannot be met; a status code
-    ├── LinkError                   a link to the PLC that cannot be opened: the process ends
     ├── ModbusRefusedError          a request that an exception code of Modbus answers
     └── BackendError                the physics gave up: not installed, disconnected or diverged
 """
@@ -46,10 +45,6 @@ class RequestRefusedError(DriverError):
     def __reduce__(self) -> tuple[type[RequestRefusedError], tuple[StatusCode, str]]:
         """It passes from one process to another with its code."""
         return type(self), (self.code, str(self))
-
-
-class LinkError(DriverError):
-    """A link to the PLC that cannot be opened here."""
 
 
 class ModbusRefusedError(DriverError):

@@ -40,7 +40,7 @@ from ir_values.files import FileRoots
 
 def declared_settings(node: Node) -> StudiesSettings:
     """Declares a parameter per setting, fixed at the start, and returns their values;
-    ParameterError for a bad one.
+    InvalidValueError for a bad one.
     """
     return Parameters(node, StudiesSettings).value
 

@@ -15,7 +15,7 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.traces import Trace
 from ir_sim_driver import DriverError, ErrorCode, TrajectoryGoal, make_simulation
 from ir_sim_driver.plant import carried
-from ir_studies.errors import DrivingError
+from ir_studies.errors import StudyError
 from ir_values.arrays import FloatArray
 
 READING = 0.01  # s between readings of positions and meter
@@ -96,7 +96,7 @@ class SimulatedRun:
             simulation.cell_watch.stand_in(self.cell, simulation.load)
 
     def drive(self, trajectory: JointTrajectory) -> tuple[float, float]:
-        """Drive a trajectory; when it began and should have ended [s]. DrivingError where it
+        """Drive a trajectory; when it began and should have ended [s]. StudyError where it
         fails.
         """
         simulation = self.simulation
@@ -105,7 +105,7 @@ class SimulatedRun:
         self._until(lambda: not simulation.executor.active, _LATEST * trajectory.duration + 1.0)
         for outcome in simulation.take_outcomes():
             if outcome.code is not ErrorCode.SUCCESSFUL:
-                raise DrivingError(f"{simulation.plant.name}: {outcome.sentence}")
+                raise StudyError(f"{simulation.plant.name}: {outcome.sentence}")
         return began, began + trajectory.duration
 
     def advance(self, seconds: float) -> None:
@@ -155,17 +155,17 @@ class SimulatedRun:
         modes = self.simulation.modes
         self._until(lambda: modes.mode is mode, _CHANGE)
         if modes.mode is not mode:
-            raise DrivingError(
+            raise StudyError(
                 f"{mode.name} has not come within {_CHANGE:g} s, it is {modes.mode.name}"
             )
 
 
 def driven(cell: Cell, plant: str, steps: Sequence[Step]) -> Trace:
-    """What is read while the plant drives these steps. DrivingError where it can't."""
+    """What is read while the plant drives these steps. StudyError where it can't."""
     try:
         run = SimulatedRun(cell, plant, steps[0].load)
         for step in steps:
             run.follow(step)
     except DriverError as error:
-        raise DrivingError(str(error)) from error
+        raise StudyError(str(error)) from error
     return run.trace()

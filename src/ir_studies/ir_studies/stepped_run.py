@@ -27,7 +27,7 @@ from ir_recorder.analysis.tending import SignalChange, TendedStep
 from ir_sim_driver import DriverError, ErrorCode, Simulation, TrajectoryGoal, make_simulation
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.plant import carried
-from ir_studies.errors import DrivingError
+from ir_studies.errors import StudyError
 from ir_values.arrays import FloatArray
 
 _REST = 0.5  # s in which the loops settle, and between looks at the capacitor
@@ -198,7 +198,7 @@ class SteppedRun:
 def driven_program(
     cell: Cell, movements: Sequence[PlannedMovement], plant: str = "nominal", seed: int = 0
 ) -> SteppedRun:
-    """A planned program, driven from where its first movement begins. DrivingError where it can't
+    """A planned program, driven from where its first movement begins. StudyError where it can't
     be driven to its end.
     """
     first = next(step for step in movements if step.trajectory is not None)
@@ -207,7 +207,7 @@ def driven_program(
     run.place(first.trajectory.positions[0])
     result = run.run(movements)
     if not result.status.ok:
-        raise DrivingError(f"{run.simulation.plant.name}: {result.status.message}")
+        raise StudyError(f"{run.simulation.plant.name}: {result.status.message}")
     return run
 
 
@@ -279,7 +279,7 @@ def driven_robots(
     signal_timeout: float = 60.0,
 ) -> dict[str, RobotRun]:
     """Several robots in one time, each with its own program and controller; a signal of one is
-    heard by all. late [s]: how much later robots begin. DrivingError where a program doesn't end.
+    heard by all. late [s]: how much later robots begin. StudyError where a program doesn't end.
     """
     turns = _Turns(len(cells))
     runs = {robot: RobotRun(cell, plant, turns, k) for k, (robot, cell) in enumerate(cells.items())}
@@ -303,7 +303,7 @@ def driven_robots(
         run.close()
         if run.result is None or not run.result.status.ok:
             why = "it ended by an error" if run.result is None else run.result.status.message
-            raise DrivingError(f"{robot}: {why}")
+            raise StudyError(f"{robot}: {why}")
     return runs
 
 

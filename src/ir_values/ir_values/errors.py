@@ -14,12 +14,10 @@
     │       └── RobotFileError
     ├── FileRefusedError                   a file outside of the allowed folders, or of another kind
     ├── UnknownTypeError                   no such message, service or action type
-    ├── ParameterError (ValueError)        a setting out of range, or one without a description
-    └── ClientError
-        ├── ServiceUnavailableError        no node offers it
-        ├── CallTimedOutError              offered, but no answer in time
-        ├── CallGivenUpError               whoever asked does not want the answer any more
-        └── RequestRefusedError            answered with a status that is not SUCCESS; carries it
+    ├── ServiceUnavailableError            no node offers what a script asks for
+    ├── CallTimedOutError                  offered, but no answer in time
+    ├── CallGivenUpError                   whoever asked does not want the answer any more
+    └── RequestRefusedError                answered with a status that is not SUCCESS; carries it
 
 A class exists where somebody catches it differently from its neighbours.
 """
@@ -71,27 +69,19 @@ class UnknownTypeError(IrError):
     """No interface of this name is installed."""
 
 
-class ParameterError(IrError, ValueError):
-    """A parameter value out of its range, or a settings class that lacks a description."""
-
-
-class ClientError(IrError):
-    """A request of a script that got no usable answer."""
-
-
-class ServiceUnavailableError(ClientError):
+class ServiceUnavailableError(IrError):
     """No node offers this service or action."""
 
 
-class CallTimedOutError(ClientError):
+class CallTimedOutError(IrError):
     """The node is there but did not answer in time."""
 
 
-class CallGivenUpError(ClientError):
+class CallGivenUpError(IrError):
     """The caller gave the call up before it was answered."""
 
 
-class RequestRefusedError(ClientError):
+class RequestRefusedError(IrError):
     """The node answered, with a status other than SUCCESS."""
 
     def __init__(self, sentence: str, code: int) -> None:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields, replace
 from typing import Any, TypeVar, get_type_hints
 
-from ir_values.errors import ParameterError, one_line
+from ir_values.errors import InvalidValueError, one_line
 
 T = TypeVar("T")
 _KEY = "setting"
@@ -50,18 +50,20 @@ class Setting:
         return f"at most {self.maximum:g}{unit}" if self.maximum is not None else ""
 
     def check(self, value: Any) -> None:
-        """Raise ParameterError with the value, its bound and the unit."""
+        """Raise InvalidValueError with the value, its bound and the unit."""
         for element in value if isinstance(value, tuple) else (value,):
             if isinstance(element, float) and not math.isfinite(element):
-                raise ParameterError(f"{self.name} is {element}: it must be finite")
+                raise InvalidValueError(f"{self.name} is {element}: it must be finite")
             if self.choices and element not in self.choices:
                 shown = one_line(str(element), _SHOWN)
-                raise ParameterError(f'{self.name} is "{shown}": known are {self.bounds}')
+                raise InvalidValueError(f'{self.name} is "{shown}": known are {self.bounds}')
             below = self.minimum is not None and element < self.minimum
             above = self.maximum is not None and element > self.maximum
             if below or above:
                 unit = f" {self.unit}" if self.unit else ""
-                raise ParameterError(f"{self.name} is {element:g}{unit}: it must be {self.bounds}")
+                raise InvalidValueError(
+                    f"{self.name} is {element:g}{unit}: it must be {self.bounds}"
+                )
 
 
 def setting(
@@ -98,7 +100,7 @@ def stage(make: Callable[[], T]) -> T:
 
 
 def describe(settings_class: type[Any]) -> tuple[Setting, ...]:
-    """The class's own settings, in order; ParameterError for a field that no parameter can stand
+    """The class's own settings, in order; InvalidValueError for a field that no parameter can stand
     for.
     """
     types = get_type_hints(settings_class)
@@ -108,9 +110,11 @@ def describe(settings_class: type[Any]) -> tuple[Setting, ...]:
         if _STAGE in each.metadata:
             continue
         if _KEY not in each.metadata or each.default is MISSING:
-            raise ParameterError(f"{where} has no description: use setting(default, sentence, ...)")
+            raise InvalidValueError(
+                f"{where} has no description: use setting(default, sentence, ...)"
+            )
         if types[each.name] not in SETTING_TYPES:
-            raise ParameterError(
+            raise InvalidValueError(
                 f"{where} is a {types[each.name]}: a parameter is one of {SETTING_TYPES}"
             )
         settings.append(Setting(each.name, types[each.name], each.default, **each.metadata[_KEY]))

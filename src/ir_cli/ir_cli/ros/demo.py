@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ir_cli.errors import DemonstrationError
+from ir_cli.errors import CommandError
 from ir_cli.output import Progress, table
 from ir_cli.ports import UDP, free_port
 from ir_cli.ros.power_tour import MODE_SECONDS, PowerWatch, tour
@@ -291,7 +291,7 @@ class Demonstration:
             parts_per_hour=tended.parts_per_hour, cycles=tended.cycles, seed=seed
         )
         if plan.run is None or plan.run_cell is None:
-            raise DemonstrationError(plan.status.message)
+            raise CommandError(plan.status.message)
         self._progress.end(repr(plan))
         planner.set_cell(plan.run_cell)
         first = plan.run.movements[0]
@@ -299,7 +299,7 @@ class Demonstration:
         start = first.trajectory.positions[0]
         there = planner.plan_regional(goal=Goal(configuration=start), start="home", seed=seed)
         if there.trajectory is None:
-            raise DemonstrationError(there.status.message)
+            raise CommandError(there.status.message)
         approach = PlannedMovement(
             kind=MovementKind.REGIONAL,
             from_station="home",
@@ -363,7 +363,7 @@ class Demonstration:
         try:
             self._tour(client)
             self._drive(client, plan.program_id)
-        except (DemonstrationError, IrError) as error:
+        except (CommandError, IrError) as error:
             self._progress.end("ended early")
             return str(error)
         return ""
@@ -372,7 +372,7 @@ class Demonstration:
         """Drive the run; why that ended early."""
         try:
             self._drive(client, self._steps)
-        except (DemonstrationError, IrError) as error:
+        except (CommandError, IrError) as error:
             self._progress.end("ended early")
             return str(error)
         return ""
@@ -454,7 +454,7 @@ def await_services(client: Client, nodes: NodeProcesses, services: Sequence[str]
     while missing := wanted - set(client.graph.services()):
         nodes.check()
         if time.monotonic() > deadline:
-            raise DemonstrationError(f"no {', '.join(sorted(missing))} after {START_SECONDS:g} s")
+            raise CommandError(f"no {', '.join(sorted(missing))} after {START_SECONDS:g} s")
         time.sleep(LOOK_SECONDS)
 
 
@@ -493,7 +493,7 @@ def naming_the_dead(nodes: NodeProcesses) -> Iterator[None]:
     """A request that fails because a node ended says which node, and why."""
     try:
         yield
-    except (DemonstrationError, IrError):
+    except (CommandError, IrError):
         nodes.check()
         raise
     nodes.check()

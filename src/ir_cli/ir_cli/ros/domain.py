@@ -21,7 +21,7 @@ DEMONSTRATION_DOMAINS = range(1, 101)
 
 
 def ros_defaults() -> dict[str, str]:
-    """Variables for nodes on this machine; raises ParameterError for an IR_NETWORK that is not
+    """Variables for nodes on this machine; raises InvalidValueError for an IR_NETWORK that is not
     known.
     """
     variables, _ = network_variables(os.environ)

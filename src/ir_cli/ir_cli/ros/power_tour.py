@@ -10,7 +10,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Sequence
 
-from ir_cli.errors import DemonstrationError
+from ir_cli.errors import CommandError
 from ir_msgs.msg import PlcInputs, PowerMode, PowerState
 from ir_msgs.srv import SetLoad, SetPlcInput
 from ir_msgs_py import names
@@ -34,7 +34,7 @@ class PowerWatch:
         client.subscribe("/" + names.POWER_STATE, PowerState, self._take)
 
     def wait_for_mode(self, mode: int) -> None:
-        """Wait until the controller rests in a mode; DemonstrationError after `patience` [s] of the
+        """Wait until the controller rests in a mode; CommandError after `patience` [s] of the
         meter.
         """
         self._wait(lambda state: state.mode == mode, f"power mode {mode}")
@@ -64,7 +64,7 @@ class PowerWatch:
         return self._now() - _seconds(self._last())
 
     def _wait(self, condition: Callable[[PowerState], bool], what: str) -> None:
-        """Until a reading meets the condition; DemonstrationError where the meter is silent for
+        """Until a reading meets the condition; CommandError where the meter is silent for
         `patience` [s], or has measured for as long: it counts its own time, since on a busy machine
         it lags behind.
         """
@@ -75,7 +75,7 @@ class PowerWatch:
                 late = heard is not None and _seconds(heard) > until
                 if late or not self._news(heard):
                     mode = "nothing" if heard is None else f"mode {heard.mode}"
-                    raise DemonstrationError(
+                    raise CommandError(
                         f"waited {self._patience:g} s for {what}; the mains meter says {mode}"
                     )
                 heard = self._state
@@ -137,7 +137,7 @@ def tour(
 
 
 def stand_on_motors(client: Client, watch: PowerWatch, stay: float) -> None:
-    """Stay `stay` [s] on motors; DemonstrationError where the controller's own timer closes the
+    """Stay `stay` [s] on motors; CommandError where the controller's own timer closes the
     brakes before, again and again: a plant that lags further behind than that timer is long never
     shows a reading of now.
     """
@@ -145,7 +145,7 @@ def stand_on_motors(client: Client, watch: PowerWatch, stay: float) -> None:
         if watch.stays(PowerMode.STAND_ON_MOTORS, stay):
             return
         motors_on(client, watch)
-    raise DemonstrationError(
+    raise CommandError(
         f"the mains meter lags {watch.lag:.0f} s behind the clock: the machine is too busy for a "
         "demonstration in real time"
     )

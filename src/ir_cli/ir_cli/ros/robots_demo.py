@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ir_cli.errors import DemonstrationError
+from ir_cli.errors import CommandError
 from ir_cli.output import Progress, table
 from ir_cli.ports import UDP, free_port
 from ir_cli.ros.demo import (
@@ -154,14 +154,14 @@ class RobotsDemonstration:
         options = PlanOptions(seed=self._seed)
         plan = plan_robots(self._cells, cycle_time=3600.0 / rate if rate else 0.0, options=options)
         if not plan.programs:
-            raise DemonstrationError(plan.status.message)
+            raise CommandError(plan.status.message)
         self._progress.end(repr(plan))
         for robot, program in zip(plan.robots, plan.programs, strict=True):
             first = next(step for step in program.movements if step.trajectory is not None)
             assert first.trajectory is not None
             off = first.trajectory.positions[0] - self._cells.of_robot(robot).machine_home
             if np.abs(off).max() > _BEGIN:
-                raise DemonstrationError(
+                raise CommandError(
                     f"{robot} stands at home first, {np.degrees(np.abs(off).max()):.1f} degrees "
                     "off where its program begins, and nothing is proved of what lies between: "
                     "give it a home_deg that is its park posture"
@@ -225,7 +225,7 @@ def driven_together(
     def drive(robot: str) -> None:
         try:
             runs[robot] = drives[robot](give_up=stopped)
-        except (DemonstrationError, IrError) as error:
+        except (CommandError, IrError) as error:
             sentences.append(f"{robot}: {error}")
             stopped.cancel()
         except BaseException:

@@ -35,7 +35,7 @@ from ir_sim_driver.plant import ControlSettings
 from ir_sim_driver.plc import PlcSettings, usable_links
 from ir_sim_driver.power import IdleTimes
 from ir_studies.settings import StudiesSettings
-from ir_values.errors import ParameterError
+from ir_values.errors import InvalidValueError
 from ir_values.settings import Setting, tree
 
 # Parameters of the nodes: their settings classes, and values that a person typed.
@@ -117,7 +117,7 @@ def _value(setting: Setting, text: str) -> Any:
         value = _elements(setting, text, value)
     try:
         setting.check(tuple(value) if isinstance(value, list) else value)
-    except ParameterError as error:
+    except InvalidValueError as error:
         raise CommandError(str(error)) from error
     return value
 

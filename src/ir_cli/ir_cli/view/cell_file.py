@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 
-from ir_cli.errors import InputError, unknown_name
+from ir_cli.errors import CommandError, InputError, unknown_name
 from ir_cli.view.moves import Moves, cell_with, edited
 from ir_description import (
     Cell,
@@ -167,12 +167,8 @@ class Recorded:
 MOST_COPIES = 1_000
 
 
-class SavingError(Exception):
-    """Why nothing was written."""
-
-
 def save(watched: Watched | Recorded, cell: Cell, moves: Moves) -> Path:
-    """The new file: the text of the old one, comments and all, with the moves. Raises SavingError.
+    """The new file: the text of the old one, comments and all, with the moves. Raises CommandError.
 
     cell: as the file has it. No file is ever overwritten, and what was written is read back and
     compared.
@@ -182,11 +178,11 @@ def save(watched: Watched | Recorded, cell: Cell, moves: Moves) -> Path:
         path = _written(watched, text)
         if cell_to_yaml(load_cell(path)) != cell_to_yaml(cell_with(cell, moves)):
             path.unlink()
-            raise SavingError(
+            raise CommandError(
                 "the file has changed meanwhile, or its poses can't be replaced one by one"
             )
     except (OSError, UnicodeError, ValueError, DescriptionError) as error:
-        raise SavingError(str(error)) from error
+        raise CommandError(str(error)) from error
     return path
 
 
@@ -198,4 +194,4 @@ def _written(watched: Watched | Recorded, text: str) -> Path:
         except FileExistsError:
             continue
         return path.resolve()
-    raise SavingError(f"there are {MOST_COPIES - 1} files {watched.stem}_moved already")
+    raise CommandError(f"there are {MOST_COPIES - 1} files {watched.stem}_moved already")

@@ -12,7 +12,7 @@ import numpy as np
 
 from ir_cli.station_access import MARGIN
 from ir_cli.view.background import QUIET, Inbox, Listener, Planned, PlanWorker, ViewRequest
-from ir_cli.view.cell_file import Recorded, SavingError, Watched, save
+from ir_cli.view.cell_file import CommandError, Recorded, Watched, save
 from ir_cli.view.clearance import Nearest, NearestPairs, StationAccess, names_in
 from ir_cli.view.moves import (
     DragTarget,
@@ -467,7 +467,7 @@ class Session:
             return
         try:
             note = f"written: {save(self._shown, self._file, self._moves)}"
-        except SavingError as error:
+        except CommandError as error:
             note = f"nothing was written: {error}"
         self._say(note=one_line(note, _LINE))
 

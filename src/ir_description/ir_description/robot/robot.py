@@ -18,7 +18,7 @@ from ir_description.robot.power import PowerData, without_table
 from ir_description.shapes import Capsule
 from ir_kernels import portable
 from ir_kernels.coupling import Coupling
-from ir_kernels.errors import InputError
+from ir_kernels.errors import KernelError
 from ir_msgs_py.names import WORLD_FRAME
 from ir_values.arrays import FloatArray, frozen, frozen_inertia, frozen_pose, in_range
 from ir_values.errors import InvalidValueError
@@ -190,7 +190,7 @@ class RobotModel:
             )
         try:
             _ = self.coupling
-        except InputError as error:
+        except KernelError as error:
             raise InvalidValueError(str(error)) from error
 
     @property

@@ -19,7 +19,7 @@ import sys
 from collections.abc import Mapping, MutableMapping
 from importlib.resources import files
 
-from ir_values.errors import ParameterError
+from ir_values.errors import InvalidValueError
 
 VARIABLE = "IR_NETWORK"
 CHOICES = ("loopback", "secure", "insecure")
@@ -44,17 +44,17 @@ def profile(name: str) -> str:
 def network_variables(environment: Mapping[str, str]) -> tuple[dict[str, str], tuple[str, ...]]:
     """Variables to set for the choice in `environment`, and those to remove.
 
-    Raises ParameterError for an unknown choice, for `secure` where security isn't enforced, and for
-    a domain that is none.
+    Raises InvalidValueError for an unknown choice, for `secure` where security isn't enforced, and
+    for a domain that is none.
     """
     domain = environment.get(DOMAIN, "")
     if domain and not (domain.isascii() and domain.isdigit() and int(domain) <= MOST_DOMAIN):
-        raise ParameterError(
+        raise InvalidValueError(
             f"{DOMAIN} is {domain[:60]!a}: it must be a whole number 0 .. {MOST_DOMAIN}"
         )
     choice = environment.get(VARIABLE, "") or "loopback"
     if choice not in CHOICES:
-        raise ParameterError(f"{VARIABLE} is {choice[:60]!a}: known are {', '.join(CHOICES)}")
+        raise InvalidValueError(f"{VARIABLE} is {choice[:60]!a}: known are {', '.join(CHOICES)}")
     if choice == "loopback":
         narrow = environment.get(RANGE, "").upper()
         return {
@@ -66,7 +66,9 @@ def network_variables(environment: Mapping[str, str]) -> tuple[dict[str, str], t
         f"{name}={value}" for name, value in _SECURITY.items() if environment.get(name) != value
     ]
     if choice == "secure" and missing:
-        raise ParameterError(f"{VARIABLE} is secure: {' and '.join(missing)} must be set as well")
+        raise InvalidValueError(
+            f"{VARIABLE} is secure: {' and '.join(missing)} must be set as well"
+        )
     if environment.get(PROFILES):
         return {}, ()
     return {PROFILES: profile("fast_discovery"), BY_PROFILE: "1"}, ()

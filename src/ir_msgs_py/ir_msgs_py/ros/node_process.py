@@ -31,7 +31,7 @@ from ir_msgs_py.ros.network import apply_network
 from ir_msgs_py.ros.parameters import check_names, introspect_services
 from ir_msgs_py.ros.rclpy_inside import UNREADABLE_ARGUMENTS, heed_times_only, survive_clients
 from ir_msgs_py.ros.spinning import LOOK, Spinning
-from ir_values.errors import ParameterError, one_line
+from ir_values.errors import InvalidValueError, one_line
 
 N = TypeVar("N", bound=Node)
 FAILURES_MAX = 50
@@ -46,10 +46,6 @@ _HELP = """usage: {name} [--ros-args [-p NAME:=VALUE ...] [--params-file FILE] [
 It runs until SIGINT or SIGTERM. Its parameters, with units and ranges, are in docs/parameters.md;
 `ros2 param describe /{name} NAME` says the same while it runs. `ir ros up` starts all nodes of a cell.
 """  # noqa: E501
-
-
-class CommandLineError(Exception):
-    """Words that make no sense; the node is not started."""
 
 
 def answer_before_start(name: str, words: Sequence[str], about: str) -> int | None:
@@ -70,7 +66,7 @@ def answer_before_start(name: str, words: Sequence[str], about: str) -> int | No
 
 
 def init_ros(words: Sequence[str] | None) -> None:
-    """rclpy.init without its signal handlers; CommandLineError with one line for words that it
+    """rclpy.init without its signal handlers; InvalidValueError with one line for words that it
     can't read.
     """
     try:
@@ -80,19 +76,19 @@ def init_ros(words: Sequence[str] | None) -> None:
 
 
 def own_words(program: str, words: Sequence[str]) -> list[str]:
-    """The words that are not for ROS; CommandLineError for such that ROS can't read."""
+    """The words that are not for ROS; InvalidValueError for such that ROS can't read."""
     try:
         return remove_ros_args([program, *words])[1:]
     except UNREADABLE_ARGUMENTS as error:
         raise _unreadable(error) from error
 
 
-def _unreadable(error: Exception) -> CommandLineError:
+def _unreadable(error: Exception) -> InvalidValueError:
     """What the C library says, without its places in its own source."""
     if type(error).__name__ == "UnknownROSArgsError":
-        return CommandLineError(f"unknown arguments after --ros-args: {one_line(str(error), 300)}")
+        return InvalidValueError(f"unknown arguments after --ros-args: {one_line(str(error), 300)}")
     what = str(error).partition(": ")[2].partition(", at /")[0].removesuffix(".")
-    return CommandLineError(one_line(what or str(error), 300))
+    return InvalidValueError(one_line(what or str(error), 300))
 
 
 def run_node(
@@ -117,7 +113,7 @@ def run_node(
     words = sys.argv[1:] if arguments is None else arguments
     if about and (answer := answer_before_start(name, words, about)) is not None:
         return answer
-    expected: tuple[type[Exception], ...] = (CommandLineError, ParameterError, *refusals)
+    expected: tuple[type[Exception], ...] = (InvalidValueError, *refusals)
     spinning = Spinning()
     _on_signals(spinning.end)
     try:

@@ -29,7 +29,7 @@ from rclpy.service_introspection import ServiceIntrospectionState
 
 from ir_msgs_py.ros.rclpy_inside import given_names
 from ir_msgs_py.ros.serving import ANY, Calls
-from ir_values.errors import IrError, ParameterError, one_line
+from ir_values.errors import InvalidValueError, IrError, one_line
 from ir_values.settings import Setting, changed, check_settings, setting, tree
 
 PACKAGE = "rcl_interfaces"
@@ -97,7 +97,7 @@ class Parameters(Generic[T]):
     now ("" = go on), for changes that must wait until the robot stands. on_change: called with the
     new settings.
 
-    Raises ParameterError when a value that the node was started with is refused.
+    Raises InvalidValueError when a value that the node was started with is refused.
     """
 
     def __init__(
@@ -138,9 +138,11 @@ class Parameters(Generic[T]):
                 self._prefix + name, _default(each), _descriptor(each)
             )
         except InvalidParameterTypeException as error:
-            raise ParameterError(f"{self._prefix}{name}: {error}") from error
+            raise InvalidValueError(f"{self._prefix}{name}: {error}") from error
         except InvalidParameterValueException as error:
-            raise ParameterError(f"{self._prefix}{name} must be {each.bounds}: {error}") from error
+            raise InvalidValueError(
+                f"{self._prefix}{name} must be {each.bounds}: {error}"
+            ) from error
         return _typed(each, parameter.value)
 
     def _mine(self, parameters: Iterable[Parameter]) -> dict[str, Any]:
@@ -158,7 +160,7 @@ class Parameters(Generic[T]):
     def _answer(self, parameters: list[Parameter]) -> SetParametersResult:
         try:
             changes = self._mine(parameters)
-        except ParameterError as error:
+        except InvalidValueError as error:
             return SetParametersResult(successful=False, reason=str(error))
         if not changes:
             return SetParametersResult(successful=True)
@@ -206,13 +208,15 @@ def _default(each: Setting) -> Any:
         return array("d", each.default)
     if isinstance(each.default, tuple):
         if not each.default:
-            raise ParameterError(f"{each.name} is an empty list of texts: ROS can't infer its type")
+            raise InvalidValueError(
+                f"{each.name} is an empty list of texts: ROS can't infer its type"
+            )
         return list(each.default)
     return each.default
 
 
 def _typed(each: Setting, value: Any) -> Any:
-    """A parameter's value as the setting has it; ParameterError for another type."""
+    """A parameter's value as the setting has it; InvalidValueError for another type."""
     value = tuple(value) if isinstance(value, (list, array)) else value
     if each.type is float:
         return _real(each.name, value)
@@ -223,13 +227,15 @@ def _typed(each: Setting, value: Any) -> Any:
 
 def _elements(name: str, value: Any) -> tuple[Any, ...]:
     if not isinstance(value, tuple):
-        raise ParameterError(f"{name} is {one_line(str(value), 80)}: it must be a list of numbers")
+        raise InvalidValueError(
+            f"{name} is {one_line(str(value), 80)}: it must be a list of numbers"
+        )
     return value
 
 
 def _real(name: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ParameterError(f"{name} is {one_line(str(value), 80)}: it must be a number")
+        raise InvalidValueError(f"{name} is {one_line(str(value), 80)}: it must be a number")
     return float(value)
 
 
@@ -262,7 +268,7 @@ def introspect_services(node: Node) -> None:
     """Declare the parameter of IntrospectionSettings, and let the services of the node that answer
     for this project publish their events as it says. Actions publish none in Jazzy.
 
-    Call it once, when all services are there. Raises ParameterError.
+    Call it once, when all services are there. Raises InvalidValueError.
     """
     chosen = Parameters(node, IntrospectionSettings).value.service_introspection
     if chosen == "off":
@@ -277,7 +283,7 @@ def introspect_services(node: Node) -> None:
 
 
 def check_names(node: Node, words: Sequence[str]) -> None:
-    """Raise ParameterError for a name of the command line `words` that the node does not have.
+    """Raise InvalidValueError for a name of the command line `words` that the node does not have.
 
     Names in files are warned of: a file may hold the parameters of several nodes for all of them.
     """
@@ -293,5 +299,5 @@ def check_names(node: Node, words: Sequence[str]) -> None:
         hint = f": did you mean {near[0]}?" if near else ""
         sentence = f"there is no parameter {one_line(name, 80)!r}{hint}"
         if name in told:
-            raise ParameterError(sentence)
+            raise InvalidValueError(sentence)
         node.get_logger().warning(f"{sentence} (in a file of parameters)")

@@ -38,7 +38,7 @@ from ir_msgs_py.ros.conversions import (
     time_to_msg,
 )
 from ir_msgs_py.ros.plan_conversions import planned_movement_from_msg, planned_movement_to_msg
-from ir_values.errors import InvalidValueError, ParameterError
+from ir_values.errors import InvalidValueError
 
 _POWER_MODE = tuple(field.name for field in fields(PowerMode))
 _INPUTS = tuple(field.name for field in fields(PlcInputs))
@@ -176,10 +176,7 @@ def controller_timers_from_msg(msg: ControllerTimersMsg) -> ControllerTimers:
         if mode in {row.mode for row in RESTS}:
             key = mode.name.lower()
             times |= {f"{key}_enter": enter, f"{key}_minimum_stay": stay, f"{key}_leave": leave}
-    try:
-        return ControllerTimers(msg.brakes_after, TransitionTimes(**times))
-    except ParameterError as error:
-        raise InvalidValueError(str(error)) from error
+    return ControllerTimers(msg.brakes_after, TransitionTimes(**times))
 
 
 def carried_load_to_msg(load: CarriedLoad) -> CarriedLoadMsg:

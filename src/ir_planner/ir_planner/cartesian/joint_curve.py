@@ -14,7 +14,7 @@ from ir_kernels import portable
 from ir_msgs_py.status import StatusCode
 from ir_planner.cartesian.chains import JUMP, ConfigurationChain, turned_towards
 from ir_planner.cartesian.path_parts import RotationRates, about_tool, rates_of
-from ir_planner.cartesian.tool_path import PathRefusedError, StrayedError, ToolPath
+from ir_planner.cartesian.tool_path import PathRefusedError, ToolPath
 from ir_planner.checks import FreeSpace
 from ir_planner.scene import PlanningScene
 from ir_values.arrays import FloatArray
@@ -131,10 +131,10 @@ def curve_of(
     why = singularity(curve.spline(place), scene) or _SHARP
     k = int(np.searchsorted(s, place))
     apart = 1e3 * (s[k] - s[k - 1])
-    raise StrayedError(
+    raise PathRefusedError(
         f"the axes can't follow the path at {place:.3f} m{why}: between samples "
         f"{apart:.2g} mm apart they leave it by {worst * SPLINE_ERROR * 1e3:.3g} mm",
-        place,
+        strayed=place,
     )
 
 
@@ -156,10 +156,10 @@ def followed(
     reached[found.pose_index[first]] = away[first] <= JUMP
     if not reached.all():
         k = int(np.argmin(reached))
-        raise StrayedError(
+        raise PathRefusedError(
             f"the path leaves the reach or an axis limit at {s[k]:.3f} m",
-            float(s[k]),
             StatusCode.NO_IK_SOLUTION,
+            float(s[k]),
         )
     q = every[first]
     jump = np.abs(np.diff(q, axis=0)).max(axis=1)
@@ -167,10 +167,10 @@ def followed(
         k = int(np.argmax(jump))
         j = int(np.argmax(np.abs(q[k + 1] - q[k])))
         name = scene.cell.robot.joint_names[j]
-        raise StrayedError(
+        raise PathRefusedError(
             f"{name} would have to jump by {np.degrees(jump[k]):.0f} deg at {s[k]:.3f} m"
             f"{singularity(q[k], scene)}",
-            float(0.5 * (s[k] + s[k + 1])),
+            strayed=float(0.5 * (s[k] + s[k + 1])),
         )
     return q
 

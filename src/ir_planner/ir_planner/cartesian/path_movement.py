@@ -12,7 +12,7 @@ from ir_planner.cartesian.joint_curve import Angle, JointCurve, angle_along, cur
 from ir_planner.cartesian.path_times import SentPath, sent, timed_stroke
 from ir_planner.cartesian.slowing import slower_between, unhurried
 from ir_planner.cartesian.speed_ramps import StrokeSpan
-from ir_planner.cartesian.tool_path import PathRefusedError, StrayedError, ToolPath, ToolPathRequest
+from ir_planner.cartesian.tool_path import PathRefusedError, ToolPath, ToolPathRequest
 from ir_planner.checks import ToolUse
 from ir_planner.curves import extremes
 from ir_planner.request import DURATION_MAX
@@ -156,7 +156,7 @@ def _driven_chains(asked: ToolPathRequest, layers: Layers) -> tuple[list[DrivenP
             notes.append(f"{len(driven)} within the limits")
         if driven:
             return driven, layers
-        strayed = [error.place for error in reasons if isinstance(error, StrayedError)]
+        strayed = [error.strayed for error in reasons if error.strayed is not None]
         closer = closer_at(asked, layers, strayed)
         if closer is layers:
             break

@@ -434,28 +434,26 @@ class ToolPathRequest:
 
 
 class PathRefusedError(Exception):
-    """The path can't be driven so; the sentence names the place [m] along it, if there is one."""
+    """The path can't be driven so; the sentence names the place [m] along it, if there is one.
 
-    def __init__(self, sentence: str, code: StatusCode = StatusCode.PLANNING_FAILED) -> None:
+    strayed [m]: where the axes can't be followed between samples of a chain: closer ones may show
+    where they turn, or that they would have to jump. None for other reasons.
+    """
+
+    def __init__(
+        self,
+        sentence: str,
+        code: StatusCode = StatusCode.PLANNING_FAILED,
+        strayed: float | None = None,
+    ) -> None:
         super().__init__(sentence)
         self.code = code
+        self.strayed = strayed
 
     @property
     def status(self) -> Status:
         """The answer."""
         return Status(self.code, str(self))
-
-
-class StrayedError(PathRefusedError):
-    """The axes can't be followed between samples of a chain at `place` m: closer ones may show
-    where they turn, or that they would have to jump.
-    """
-
-    def __init__(
-        self, sentence: str, place: float, code: StatusCode = StatusCode.PLANNING_FAILED
-    ) -> None:
-        super().__init__(sentence, code)
-        self.place = place
 
 
 class NoChainError(Exception):

@@ -19,7 +19,7 @@ from ir_planner.checks import FreeSpace
 from ir_planner.curves import spline_through, to_ppoly, virtual_knots
 from ir_planner.scene import movement_cost, path_cost
 from ir_values.arrays import FloatArray, IntArray
-from ir_values.errors import ParameterError
+from ir_values.errors import InvalidValueError
 from ir_values.settings import check_settings, setting
 
 SAMPLES_MAX = 200
@@ -117,13 +117,13 @@ class GeneticSettings:
     def __post_init__(self) -> None:
         check_settings(self)
         if self.per_island <= self.elite:
-            raise ParameterError(
+            raise InvalidValueError(
                 f"elite is {self.elite}: it must be less than population / islands, "
                 f"which is {self.per_island}"
             )
         for less, more in (("spread_least", "spread_most"), ("mutation_least", "mutation")):
             if getattr(self, less) > getattr(self, more):
-                raise ParameterError(
+                raise InvalidValueError(
                     f"{less} is {getattr(self, less):g} rad: it must be at most {more}, "
                     f"which is {getattr(self, more):g} rad"
                 )

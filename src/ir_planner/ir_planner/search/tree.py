@@ -265,7 +265,7 @@ def connect(
     """A free path from start (n,) to one of goals (G, n), unless the budget, or `most` edges, end
     before one is found.
 
-    Raises CancelledError when asked to stop, ir_kernels.InputError where start, or every goal,
+    Raises CancelledError when asked to stop, ir_kernels.KernelError where start, or every goal,
     isn't free.
     """
     work = space.work

@@ -18,7 +18,7 @@ from ir_msgs.srv import StartRecording, StopRecording
 from ir_msgs_py import names
 from ir_msgs_py.checks import one_line
 from ir_msgs_py.ros.diagnostics import ERROR, OK, WARN, Condition, Diagnostics
-from ir_msgs_py.ros.node_process import CommandLineError, own_words, run_node
+from ir_msgs_py.ros.node_process import InvalidValueError, own_words, run_node
 from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.ros.serving import BoundedService, answered
 from ir_msgs_py.status import Status, StatusCode
@@ -168,7 +168,7 @@ class RecorderDiagnostics:
 
 def declared_settings(node: Node) -> RecorderSettings:
     """Declares a parameter per setting, fixed at the start, and returns their values;
-    ParameterError for a bad one.
+    InvalidValueError for a bad one.
     """
     return Parameters(node, RecorderSettings).value
 
@@ -457,7 +457,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     everything = sys.argv[1:] if arguments is None else list(arguments)
     try:
         options = record_parser().parse_args(own_words("ir-record", everything))
-    except CommandLineError as error:
+    except InvalidValueError as error:
         sys.stderr.write(f"ir-record: {error}\n")
         return 1
 

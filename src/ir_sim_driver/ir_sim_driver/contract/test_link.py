@@ -12,7 +12,7 @@ import pytest
 
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.plc import OperatingMode, PlcInputs, PlcOutputs
-from ir_sim_driver.errors import LinkError
+from ir_sim_driver.errors import DriverError
 from ir_sim_driver.plc import LINKS, WRITERS, Link, OpenLink, Readout
 from ir_values.settings import describe
 
@@ -130,7 +130,7 @@ def test_it_serves_on_a_free_port_and_gives_it_back(kind: type[Link], controller
 def test_a_taken_port_is_an_error_with_its_number(
     kind: type[Link], controller: Recorder, served: OpenLink
 ) -> None:
-    with pytest.raises(LinkError, match=str(served.port)):
+    with pytest.raises(DriverError, match=str(served.port)):
         settings(kind, served.port).open(controller)
 
 

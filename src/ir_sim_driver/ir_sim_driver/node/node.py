@@ -32,7 +32,7 @@ from ir_msgs_py.ros.serving import BoundedService
 from ir_msgs_py.ros.topics import ACTION_SERVICES
 from ir_msgs_py.stops import before_first_stop
 from ir_sim_driver.controller import Driver, Joints, Simulation, ended_by_stop, make_simulation
-from ir_sim_driver.errors import DriverError, LinkError, TrajectoryRefusedError
+from ir_sim_driver.errors import DriverError, TrajectoryRefusedError
 from ir_sim_driver.node.announcements import DriverAnnouncements
 from ir_sim_driver.node.controller_interface import (
     StateQueries,
@@ -69,7 +69,7 @@ def open_links(links: Iterable[Link], driver: Driver) -> dict[str, OpenLink]:
             continue
         try:
             opened[link.name] = link.open(driver.plc)
-        except LinkError as error:
+        except DriverError as error:
             driver.warn(str(error))
             if link.name == WakeOnLan.name:
                 driver.forbid_hibernation(f"nothing could wake the controller ({error})")

@@ -13,7 +13,7 @@ from typing import ClassVar, Protocol, TypeVar
 
 from ir_msgs_py.plc import OperatingMode
 from ir_msgs_py.status import StatusCode
-from ir_sim_driver.errors import DriverError, LinkError, ModbusRefusedError, RequestRefusedError
+from ir_sim_driver.errors import DriverError, ModbusRefusedError, RequestRefusedError
 from ir_sim_driver.plc.port import STOP_BIT, Controller, OpenLink, Readout
 from ir_values.settings import check_settings, setting
 
@@ -506,10 +506,10 @@ class ModbusTcp:
         return self.modbus
 
     def open(self, controller: Controller) -> OpenLink:
-        """Serve the controller. Raises LinkError when the port is taken."""
+        """Serve the controller. Raises DriverError when the port is taken."""
         tables = ControllerTables(controller, self.modbus_watchdog)
         limits = ClientLimits(self.modbus_connections, self.modbus_idle)
         try:
             return ModbusServer(self.modbus_host, self.modbus_port, tables, limits)
         except OSError as error:
-            raise LinkError(f"no Modbus: {error}") from error
+            raise DriverError(f"no Modbus: {error}") from error

@@ -91,4 +91,4 @@ class Link(Protocol):
         """Whether the settings ask for it."""
 
     def open(self, controller: Controller) -> OpenLink:
-        """Serve the controller. Raises LinkError when that is not possible here."""
+        """Serve the controller. Raises DriverError when that is not possible here."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ir_msgs_py.plc import CONTROLLER_MAC, WAKE_PORT, mac_bytes, wakes
-from ir_sim_driver.errors import LinkError
+from ir_sim_driver.errors import DriverError
 from ir_sim_driver.plc.port import Controller, OpenLink
 from ir_values.settings import check_settings, setting
 
@@ -48,12 +48,12 @@ class WakeOnLan:
         return True
 
     def open(self, controller: Controller) -> OpenLink:
-        """Listen. Raises LinkError when the port is taken."""
+        """Listen. Raises DriverError when the port is taken."""
         try:
             return WakeListener(self.wake_host, self.wake_port, self.mac, controller.wake)
         except OSError as error:
             where = f"UDP {self.wake_host}:{self.wake_port}"
-            raise LinkError(f"no Wake-on-LAN: {where} can't be opened ({error})") from error
+            raise DriverError(f"no Wake-on-LAN: {where} can't be opened ({error})") from error
 
 
 class WakeListener:

@@ -216,7 +216,7 @@ _STARTS = 2  # looks at what it takes to start a process of OMPL, after the firs
 
 def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
     """Rows of entries, with everything loaded that is loaded once; `read` of the settings: what
-    must be the same here. WorkerError where it is not.
+    must be the same here. StudyError where it is not.
     """
     read: dict[str, Any] = {  # JSON knows no tuples
         key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()

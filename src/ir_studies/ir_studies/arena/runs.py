@@ -27,7 +27,7 @@ from ir_studies.arena.settings import (
     read_settings,
     settings_text,
 )
-from ir_studies.errors import FolderError, SettingsError, StoppedError, StudyError, WorkerError
+from ir_studies.errors import SettingsError, StoppedError, StudyError
 from ir_studies.work import Means, Results, StudyJob
 from ir_values.files import ANYWHERE
 
@@ -58,7 +58,7 @@ _STATUS = ("answered", "died", "cut")
 
 
 def write_database(runs: Sequence[ArenaRun], settings: ArenaSettings, path: Path) -> Path:
-    """Write the database in place of an earlier one. FolderError where that can't be done."""
+    """Write the database in place of an earlier one. StudyError where that can't be done."""
     part = path.with_name(path.name + ".part")
     try:
         part.unlink(missing_ok=True)
@@ -72,7 +72,7 @@ def write_database(runs: Sequence[ArenaRun], settings: ArenaSettings, path: Path
     except (OSError, sqlite3.Error) as error:
         with suppress(OSError):
             part.unlink(missing_ok=True)
-        raise FolderError(f"{path} can't be written: {error}") from error
+        raise StudyError(f"{path} can't be written: {error}") from error
     return path
 
 
@@ -260,7 +260,7 @@ def _written_when_stopped(write: Callable[[], object]) -> Iterator[None]:
     """Where what is done inside is stopped, what is known so far is written before that goes on."""
     try:
         yield
-    except (KeyboardInterrupt, StoppedError, WorkerError):
+    except (KeyboardInterrupt, StoppedError, StudyError):
         write()
         raise
 

@@ -19,7 +19,7 @@ from ir_recorder.reading.recording import JointSeries
 from ir_recorder.traces import Trace
 from ir_sim_driver import DriverError
 from ir_sim_driver.plant import carried, plant_hash, plant_named
-from ir_studies.errors import DrivingError, StudyError
+from ir_studies.errors import StudyError
 from ir_studies.simulated_run import READING, SimulatedRun
 from ir_studies.statistics.findings import Findings, findings_of, solved
 from ir_studies.statistics.outputs import summary_of, summed_up, write_outputs
@@ -117,7 +117,7 @@ AROUND = 0.5  # s after a movement that the filter of the indirect measurement m
 
 def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
     """Rows of pairs by their numbers, with the cell and its places loaded once; `read` of the
-    settings: what must be the same here. WorkerError where it is not.
+    settings: what must be the same here. StudyError where it is not.
     """
     given = settings.get("read", {})
     asked = StatisticsSettings(**{key: value for key, value in settings.items() if key != "read"})
@@ -204,7 +204,7 @@ def _driven(trajectory: JointTrajectory, load: str, plant: str, cell: Cell) -> R
             return _measured(run, began, ended)
         finally:
             run.close()
-    except (DriverError, DrivingError) as error:
+    except (DriverError, StudyError) as error:
         return {
             "direct_j": math.nan,
             "indirect_j": math.nan,

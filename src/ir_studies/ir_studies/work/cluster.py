@@ -21,7 +21,7 @@ from types import ModuleType, TracebackType
 from typing import Any
 from uuid import uuid4
 
-from ir_studies.errors import StoppedError, StudyError, WorkerError
+from ir_studies.errors import StoppedError, StudyError
 from ir_studies.work.fingerprint import computed_with
 from ir_studies.work.job import Job, Row, StudyJob
 from ir_studies.work.pool import Pool
@@ -142,7 +142,7 @@ def _distributed() -> ModuleType:
     try:
         return import_module("distributed")
     except ImportError as error:
-        raise WorkerError(_MISSING) from error
+        raise StudyError(_MISSING) from error
 
 
 @dataclass
@@ -155,7 +155,7 @@ class Cluster:
     """Makes jobs by the workers of a scheduler; `stopped` as in Pool."""
 
     def __init__(self, task: StudyJob, address: str, stopped: Stopped | None = None) -> None:
-        """Connect. WorkerError where Dask is missing, nobody answers, or no worker is there."""
+        """Connect. StudyError where Dask is missing, nobody answers, or no worker is there."""
         self._dask = _distributed()
         self._stopped = stopped
         self._task = json.dumps(asdict(task))
@@ -170,14 +170,14 @@ class Cluster:
             self._client = self._dask.Client(address, timeout=_CONNECT_S, set_as_default=False)
         except Exception as error:  # who knows what answers there, and how Dask reads it
             said = str(error) or f"nothing within {_CONNECT_S:g} s"
-            raise WorkerError(
+            raise StudyError(
                 f"no Dask scheduler answers at {address!r:.80}: {said:.200}"
             ) from error
         try:
             self._client.wait_for_workers(1, timeout=_CONNECT_S)
         except TimeoutError as error:
             self._client.close()
-            raise WorkerError(
+            raise StudyError(
                 f"the scheduler at {address} has no worker: start one, dask worker {address}"
             ) from error
 
@@ -235,7 +235,7 @@ class Cluster:
             AttributeError,
             OSError,
         ) as error:  # AttributeError: the client has given the scheduler up
-            raise WorkerError(_GONE) from error
+            raise StudyError(_GONE) from error
         return sum(int(count) for count in threads.values())
 
     def _next(self, done: Queue[Any]) -> Any:
@@ -265,10 +265,10 @@ class Cluster:
         except StudyError:
             raise
         except (self._dask.CancelledError, OSError) as error:
-            raise WorkerError(_GONE) from error
+            raise StudyError(_GONE) from error
         except Exception as error:  # whatever is installed there, or is not
             said = f"{type(error).__name__}: {error!s:.200}"
-            raise WorkerError(f"a worker of the cluster can't make jobs: {said}") from error
+            raise StudyError(f"a worker of the cluster can't make jobs: {said}") from error
         return row
 
     def __enter__(self) -> Cluster:
@@ -313,12 +313,12 @@ _kept = Kept()
 
 
 def made(study: str, task: str, words: Mapping[str, Any], build: str) -> Row:
-    """In a worker of the cluster: the row of a job. WorkerError where it would compute other
+    """In a worker of the cluster: the row of a job. StudyError where it would compute other
     bits.
     """
     read: StudyJob = StudyJob(**json.loads(task))
     if computed_with(read.kind) != build:
-        raise WorkerError(
+        raise StudyError(
             f"a worker of the cluster computes with {computed_with(read.kind)}, not with {build}"
         )
     return _kept.row(study, lambda stopped: Pool(read, 1, stopped=stopped), Job("", words))

@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Protocol
 
-from ir_studies.errors import StudyError, WorkerError
+from ir_studies.errors import StudyError
 from ir_studies.work.job import Job, Row, StudyJob
 from ir_studies.work.pool import COMMAND, Pool
 
@@ -35,7 +35,7 @@ class Makers(Protocol):
 @dataclass(frozen=True)
 class Means:
     """workers: processes of this machine, 0: one per core. scheduler: address of a Dask scheduler
-    instead, as tcp://127.0.0.1:8786; WorkerError where it can't be one. progress: called with a
+    instead, as tcp://127.0.0.1:8786; StudyError where it can't be one. progress: called with a
     phase, jobs made, that of all, and the best so far in words. stopped: asked several times a
     second; True ends the study with StoppedError. command: what a worker process is.
     """
@@ -68,7 +68,7 @@ def _check_address(scheduler: str) -> None:
     """Before anybody waits for an answer: Dask takes most words for the name of a machine."""
     found = _ADDRESS.fullmatch(scheduler)
     if found is None or not 1 <= int(found["port"]) <= _MOST_PORTS:
-        raise WorkerError(
+        raise StudyError(
             f"scheduler is {scheduler!r:.80}: it must be an address with a port in 1 .. "
             f"{_MOST_PORTS}, as tcp://127.0.0.1:8786"
         )

@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from types import TracebackType
 
-from ir_studies.errors import StoppedError, WorkerError
+from ir_studies.errors import StoppedError, StudyError
 from ir_studies.work.job import REFUSED, Job, Row, StudyJob
 from ir_studies.work.lifeline import VARIABLE
 
@@ -54,7 +54,7 @@ class _Worker:
             )
         except OSError as error:
             os.close(self._lifeline)
-            raise WorkerError(f"a worker can't be started: {error.strerror}") from error
+            raise StudyError(f"a worker can't be started: {error.strerror}") from error
         finally:
             os.close(held)
         self.turn: _Turn | None = None
@@ -121,7 +121,7 @@ class Pool:
         self._failed_starts = 0
 
     def rows(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Row]]:
-        """Each job with its row, as they are made. WorkerError where no worker starts."""
+        """Each job with its row, as they are made. StudyError where no worker starts."""
         self._turns = deque(_Turn(job) for job in jobs)
         while self._turns or any(worker.turn for worker in self._workers):
             for worker in self._workers:
@@ -168,7 +168,7 @@ class Pool:
                 continue
             for row in rows:
                 if not worker.ready and REFUSED in row:
-                    raise WorkerError(f"a worker can't begin: {row[REFUSED]}")
+                    raise StudyError(f"a worker can't begin: {row[REFUSED]}")
                 turn = worker.turn
                 worker.ready = True
                 self._failed_starts = 0
@@ -209,7 +209,7 @@ class Pool:
         if turn is None and not worker.ready:
             self._failed_starts += 1
             if self._failed_starts == _MOST_STARTS:
-                raise WorkerError(
+                raise StudyError(
                     f"a worker {outcome} before it could start: its last words are above"
                 )
         elif turn is not None and outcome == "died" and not turn.again:

@@ -18,7 +18,7 @@ from typing import Any
 
 from ir_description import Cell
 from ir_description.cell import Task
-from ir_studies.errors import FolderError, WorkerError
+from ir_studies.errors import StudyError
 from ir_studies.work.fingerprint import computed_with
 from ir_studies.work.job import Job, Row
 
@@ -47,12 +47,12 @@ def title(name: str) -> str:
 
 
 def refuse_others(given: Mapping[str, str], found: Mapping[str, str]) -> None:
-    """WorkerError where this process reads something else than the study: an older file, or an
+    """StudyError where this process reads something else than the study: an older file, or an
     edited one.
     """
     for name, digest in given.items():
         if found.get(name) != digest:
-            raise WorkerError(f"{title(name)} is not here what the study has read")
+            raise StudyError(f"{title(name)} is not here what the study has read")
 
 
 def _digest(tasks: Sequence[Task]) -> str:
@@ -74,7 +74,7 @@ class Results:
     def __init__(
         self, folder: Path, kind: str, budget: Mapping[str, Any], cells: Mapping[str, str]
     ) -> None:
-        """Open or begin. FolderError where the folder is in use or holds results of other
+        """Open or begin. StudyError where the folder is in use or holds results of other
         settings.
         """
         self.rows: dict[str, Row] = {}
@@ -87,19 +87,19 @@ class Results:
             flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
             self._file = os.fdopen(os.open(self.path, flags, 0o644), "r+b")
         except OSError as error:
-            raise FolderError(f"{self.path} can't be written: {error.strerror}") from error
+            raise StudyError(f"{self.path} can't be written: {error.strerror}") from error
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             self._read(cells)
         except BlockingIOError as error:
             self._drop()
-            raise FolderError(
+            raise StudyError(
                 f"{folder} is in use by another study: wait, or name another folder"
             ) from error
         except OSError as error:  # a file system without locks, a disk that can't be read
             self._drop()
-            raise FolderError(f"{self.path} can't be used: {error.strerror}") from error
-        except FolderError:
+            raise StudyError(f"{self.path} can't be used: {error.strerror}") from error
+        except StudyError:
             self._drop()
             raise
 
@@ -111,7 +111,7 @@ class Results:
         found = _mapping(lines[0]) if lines else head
         begun = lines or json.dumps(head).encode().startswith(content)
         if not (begun and found is not None and found.get("format") == head["format"]):
-            raise FolderError(
+            raise StudyError(
                 f"{self.path} holds no results of {_TITLES[self._kind]}: name another folder"
             )
         rows = [self._row(number, line) for number, line in enumerate(lines[1:], start=2)]
@@ -136,7 +136,7 @@ class Results:
             or not isinstance(row.get("cells", {}), dict)
         ):
             said = "delete the line, and its job is made again"
-            raise FolderError(f"{self.path}: line {number} is damaged: {said}")
+            raise StudyError(f"{self.path}: line {number} is damaged: {said}")
         return row
 
     def _check(
@@ -145,13 +145,13 @@ class Results:
         begun = head.get("budget", {})
         for key in {**begun, **self._budget}:
             if begun.get(key) != self._budget.get(key):
-                raise FolderError(
+                raise StudyError(
                     f"{self.path} holds results with {key} {begun.get(key)!s:.80}, the settings "
                     f"have {self._budget.get(key)!s:.80}: name another folder"
                 )
         for name, digest in cells.items():
             if known.get(name, digest) != digest:
-                raise FolderError(
+                raise StudyError(
                     f"{self.path} holds results of another {title(name)}: name another folder"
                 )
 
@@ -180,7 +180,7 @@ class Results:
             self._file.flush()
             os.fsync(self._file.fileno())
         except OSError as error:
-            raise FolderError(f"{self.path} can't be written: {error.strerror}") from error
+            raise StudyError(f"{self.path} can't be written: {error.strerror}") from error
 
     def _drop(self) -> None:
         """Close the file, whatever it says: what was not written is refused by who asks."""
