@@ -54,7 +54,11 @@ def stranger(seed: int) -> Stranger:
     """A robot of a payload between 4 and 200 kg."""
     rng = np.random.default_rng(seed)
     payload = float(np.exp(rng.uniform(np.log(4.0), np.log(200.0))))
-    known = _built(payload, rng)
+    return standing_for(_built(payload, rng), payload, rng)
+
+
+def standing_for(known: RobotModel, payload: float, rng: np.random.Generator) -> Stranger:
+    """A robot of which `known` is known, for a payload [kg], with figures of its own."""
     n = known.n
     spread = rng.lognormal
     peak = known.envelope_torque[:, 0]
@@ -131,6 +135,12 @@ def _built(payload: float, rng: np.random.Generator) -> RobotModel:
 
 def recorded(robot: Stranger, seconds: float, seed: int) -> Samples:
     """What the log of the controller and a meter beside it give of a run of random movements."""
+    joints, meter = logged(robot, seconds, seed)
+    return samples_of(joints, meter, robot.known.joint_names, MODES, [(-np.inf, np.inf, ())])
+
+
+def logged(robot: Stranger, seconds: float, seed: int) -> tuple[Trace, Trace]:
+    """The log of the controller, and that of a meter beside it on the same clock."""
     rng = np.random.default_rng(seed)
     time, q, qd, qdd = _motion(robot.known, seconds, rng)
     watts = _watts(robot, time, qd, _torques(robot, time, q, qd, qdd))
@@ -141,8 +151,7 @@ def recorded(robot: Stranger, seconds: float, seed: int) -> Samples:
     mean = watts[: count * READING].reshape(count, READING).mean(axis=1)
     mean = mean * (1.0 + rng.normal(0.0, 0.005, count)) + rng.normal(0.0, 2.0, count)
     at = DT * READING * np.arange(1, count + 1)
-    meter = Trace("meter", at, {"power": mean})
-    return samples_of(joints, meter, names, MODES, [(-np.inf, np.inf, ())])
+    return joints, Trace("meter", at, {"power": mean})
 
 
 def _motion(

@@ -341,7 +341,8 @@ def _split(known: Estimate, whole: Estimate, data: str, name: str) -> Row:
     rows = len(motors.window) // n
     inside = motors.window[:rows] >= whole.runs[-1].first
     count = len(whole.prior.names)
-    extra = np.concatenate([np.zeros(n), motors.scales(whole.prior.mean)])
+    gains = motors.scales(whole.prior.mean, ~inside)
+    extra = np.concatenate([np.zeros(n), gains])
     table = motors.measured.reshape(n, rows).T
     speed = motors.speed
 

@@ -19,6 +19,7 @@ from ir_recorder.measure.power_model import Prepared
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 WINDOW = 5  # samples whose mean is one residual: 50 ms
+MOVED = 0.05  # rad: a joint that moves
 LEAST_WATTS = 0.5  # noise of a residual, at least: the resolution of meters
 _LEAST_SHARE = 1e-3  # of the largest effort of an axis: the resolution of controllers
 _OFFSET = 0.02  # of the largest effort: what a sensor or a centre of mass may add to an axis
@@ -159,13 +160,19 @@ class Motors:
         """Whether amperes were recorded, not torques."""
         return self._runs[0].samples.currents
 
-    def scales(self, mean: FloatArray) -> FloatArray:
-        """Amperes per Nm (n,) that fit the torques of parameters `mean` best; 1 for torques."""
+    def scales(self, mean: FloatArray, seen: BoolArray | None = None) -> FloatArray:
+        """Amperes per Nm (n,) that fit the torques of parameters `mean` best in the windows (W,)
+        that were seen (None: in all); 1 for torques.
+        """
         if not self.currents:
             return np.ones(self.n)
         torque = self.reduced([self._model.torque(mean, run.prepared) for run in self._runs])
+        table = self._table
+        if seen is not None:
+            torque = torque[seen]
+            table = table[seen]
         power = np.maximum((torque**2).sum(axis=0), 1e-12)
-        return np.asarray((torque * self._table).sum(axis=0) / power)
+        return np.asarray((torque * table).sum(axis=0) / power)
 
     def own_prior(self, mean: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Values and deviations (2 n,) of offsets and scales before the fit."""

@@ -13,14 +13,13 @@ import numpy as np
 from ir_description import PowerParameters
 from ir_description.robot import AXIS_UNITS
 from ir_recorder.errors import RecorderError
-from ir_recorder.fit.channels import FittedRun, by_window
+from ir_recorder.fit.channels import MOVED, FittedRun, by_window
 from ir_recorder.fit.data import DataSource, FitData, fit_data
 from ir_recorder.fit.estimate import Estimate, Fit
 from ir_recorder.measure import Samples
 from ir_values.arrays import FloatArray, IntArray
 
 EXPLAINED = 0.8  # of the variance of power, or of an axis' torque, in motion: less is a doubt
-_MOVED = 0.05  # rad: a joint that moves
 _STILL = 1e-3  # rad: one that doesn't
 _LATE = 0.03  # s: less is not told apart
 _LONGEST = 1.0  # s that are looked for
@@ -160,7 +159,7 @@ def _of_still_joints(estimate: Estimate) -> Iterator[str]:
     """Columns that never change while others do."""
     positions = [run.samples.q[run.samples.known] for run in estimate.runs]
     spans = np.max([np.ptp(q, axis=0) for q in positions if len(q)], axis=0, initial=0.0)
-    if not (spans > _MOVED).any():
+    if not (spans > MOVED).any():
         return
     for joint, span in zip(estimate.prior.joints, spans, strict=True):
         if span < _STILL:

@@ -1,7 +1,9 @@
 """What a fit is worth on what it has not seen, beside the data sheet and a plain regression.
 
-Each part is left out once: a recording, or a quarter where there is one alone. The data sheet is
-given what it can't know, the watts at rest of a controller without a table.
+Each part is left out once: a recording where every joint that moves does so in others too, else a
+quarter of each, for nobody can predict an axis that was never seen to move. The data sheet is given
+what it can't know, from the other parts: the watts at rest of a controller without a table, and the
+gains of currents.
 """
 
 from __future__ import annotations
@@ -11,14 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_recorder.fit.channels import WINDOW, FittedRun, Motors
+from ir_recorder.fit.channels import MOVED, WINDOW, FittedRun, Motors
 from ir_recorder.fit.estimate import Estimate
 from ir_recorder.measure import movements
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
-QUARTERS = 4  # parts of a single recording
+QUARTERS = 4  # parts of each recording
 METHODS = ("fit", "data sheet", "regression")
-_NEARER = 0.9  # of the fit's error: a regression with less is said to be nearer
 _NINETY = 1.645  # standard deviations
 
 
@@ -63,11 +64,11 @@ def recommendation(
         return f"{said}: plan with {begun}, this fit is worse on this robot"
     if doubted:
         return f"{said}: settle what speaks against the data before you plan with the fit"
-    if regression < _NEARER * fitted:
+    if regression < fitted:
         return (
             f"{said}: plan with the fit only if {fitted:.1f} % is near enough; the regression, "
-            "which no plan can use, is nearer, so the model lacks something of this robot (a load, "
-            "a coupling, other losses)"
+            "which no plan can use, is nearer, so the model may lack something of this robot (a "
+            "load, a coupling, other losses)"
         )
     return f"{said}: plan with the fit"
 
@@ -88,13 +89,21 @@ class _Part:
 
 def _parts(estimate: Estimate) -> list[_Part]:
     known = np.unique(estimate.window)
-    if len(estimate.runs) > 1:
-        return [
-            _Part(run.name, known[(known >= run.first) & (known < _end(run))])
-            for run in estimate.runs
-        ]
-    shares = np.array_split(known, QUARTERS)
-    return [_Part(f"part {k} of {QUARTERS}", share) for k, share in enumerate(shares, 1)]
+    own = [known[(known >= run.first) & (known < _end(run))] for run in estimate.runs]
+    if _all_move_elsewhere(estimate.runs):
+        return [_Part(run.name, windows) for run, windows in zip(estimate.runs, own, strict=True)]
+    quarters = zip(*(np.array_split(windows, QUARTERS) for windows in own), strict=True)
+    return [
+        _Part(f"part {k} of {QUARTERS}", np.concatenate(shares))
+        for k, shares in enumerate(quarters, 1)
+    ]
+
+
+def _all_move_elsewhere(runs: Sequence[FittedRun]) -> bool:
+    """Whether every joint that moves in one recording moves in another as well."""
+    positions = [run.samples.q[run.samples.known] for run in runs]
+    spans = np.array([np.ptp(q, axis=0) if len(q) else np.zeros(q.shape[1]) for q in positions])
+    return len(runs) > 1 and bool((np.count_nonzero(spans > MOVED, axis=0) != 1).all())
 
 
 def _end(run: FittedRun) -> int:
@@ -236,14 +245,15 @@ def _worked(estimate: Estimate, parts: Sequence[_Part]) -> tuple[LeftOut, ...]:
     rows = len(motors.window) // n
     window = motors.window[:rows]
     speed = motors.speed
-    start = np.concatenate([estimate.prior.mean, np.zeros(n), motors.scales(estimate.prior.mean)])
-    sheet = motors.predicted(start, 0.0)[0].reshape(n, rows).T
     measured = motors.measured.reshape(n, rows).T
     found = []
     for part in parts:
         x, _ = _without(estimate, part)
         own = motors.predicted(x, 0.0)[0].reshape(n, rows).T
         inside = np.isin(window, part.windows)
+        gains = motors.scales(estimate.prior.mean, ~inside)
+        start = np.concatenate([estimate.prior.mean, np.zeros(n), gains])
+        sheet = motors.predicted(start, 0.0)[0].reshape(n, rows).T
         plain = plain_torques(estimate, inside)
         work = shaft_work(measured[inside], speed[inside])
         for method, predicted in zip(METHODS, (own, sheet, plain), strict=True):
