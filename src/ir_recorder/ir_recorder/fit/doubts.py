@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 
 from ir_description import PowerParameters
-from ir_description.robot import AXIS_UNITS
+from ir_description.robot import AXIS_UNITS, CENTRES, parameter_unit
 from ir_recorder.errors import RecorderError
 from ir_recorder.fit.channels import MOVED, FittedRun, by_window
 from ir_recorder.fit.data import DataSource, FitData, fit_data
@@ -169,8 +169,9 @@ def _of_still_joints(estimate: Estimate) -> Iterator[str]:
             )
 
 
-# What a fit has to believe to explain the data: masses and inverter factors far from what is known
-# of them, or a meter that shows a part of what the robot takes.
+# What a fit has to believe to explain the data: masses, centres of mass and inverter factors far
+# from what is known of them, or a meter that shows a part of what the robot takes. A joint whose
+# zero is elsewhere, or whose sign is another, is explained by a centre of mass outside its link.
 #
 # A model that takes g times the watts, with g times the masses and friction, predicts the same
 # movements: whether the meter shows a share of the watts is seen only by what is known of masses,
@@ -191,17 +192,20 @@ _AGAINST_WATTS = ("copper",)
 
 
 def _of_factors(estimate: Estimate, found: Fit) -> Iterator[str]:
-    """Factors that lie where they are not believed."""
+    """Factors and centres of mass that lie where they are not believed."""
     before = estimate.prior
-    for name in _KNOWN_FACTORS:
-        k = before.index(name)
+    for k, name in enumerate(before.names):
+        if name.partition(".")[0] not in (*_KNOWN_FACTORS, *CENTRES):
+            continue
         spread = float(np.hypot(before.deviation[k], found.parameters.deviation[k]))
         off = float(found.parameters.mean[k] - before.mean[k])
         if found.determined[k] and abs(off) > _FAR * spread:
+            unit = parameter_unit(name)
             yield (
-                f"{name} would be {found.parameters.mean[k]:.2f}, {abs(off) / spread:.1f} "
-                f"deviations from {before.mean[k]:.2f}: look at the meter (all phases, its unit), "
-                "the load, and the masses of the robot file"
+                f"{name} would be {found.parameters.mean[k]:.2f} {unit}".rstrip()
+                + f", {abs(off) / spread:.1f} deviations from {before.mean[k]:.2f}: look at the "
+                "meter (all phases, its unit), the zeros and signs of the joints, the load, and "
+                "the masses of the robot file"
             )
 
 
