@@ -326,3 +326,10 @@ def test_distances_of_the_review_agree_with_the_kernels(cell: Cell) -> None:
             exact = CollisionModel(chain, [capsule], [body], ()).distances(home)[0, 0]
             if exact > -capsule.radius:  # where the capsule's axis is outside both mean the same
                 assert capsule_distance(body, in_world) == pytest.approx(exact, abs=1e-6), kind
+
+
+def test_a_program_begins_where_its_last_cycle_ended() -> None:
+    demo = load_cell("demo")
+    assert demo.cycle_start() == "home"
+    assert demo.cycle_start(("home", "gauge_measure", "park")) == "park"
+    assert demo.cycle_start(("home", "gauge_measure")) == "park"

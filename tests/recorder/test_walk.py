@@ -101,7 +101,7 @@ def cycles_of(seconds: float, costs: Costs) -> tuple[float, float]:
 
 def quantities(analysis: Analysis, cycle: Production, costs: Costs) -> dict[str, float]:
     """What the pages show under these names, computed once, here."""
-    cycles, year = cycles_of(cycle.seconds, costs)
+    cycles, year = cycles_of(cycle.pace, costs)
     price = costs.production_price / 3.6e6
     found = {
         "a year of such cycles": cycle.energy * year * price,
@@ -284,7 +284,9 @@ def test_of_a_route_a_cycle_is_that_of_a_part(
     assert made.program is not None
     cycle = production_of(made)
     assert cycle is not None
-    assert cycle.energy == pytest.approx(sum(part.joules for part in made.tending.parts) / 2.0)
+    steady = made.tending.steady
+    assert steady
+    assert cycle.energy == pytest.approx(sum(part.joules for part in steady) / len(steady))
     assert sum(share.energy for share in cycle.modes.values()) == pytest.approx(cycle.energy)
     assert "more outside of their times" not in report_html(made, findings(made))
     more = replace(made.program.whole, energy=made.program.whole.energy + 36_000.0)

@@ -9,8 +9,8 @@ import numpy as np
 
 from ir_description import Cell, ProgramStep
 from ir_msgs_py.report import PlannedMovement
+from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
-from ir_planner.checks import interval
 from ir_planner.cycle import ModeWait, SteadyCycle, Visit
 from ir_planner.flexible.columns import TendedRoute, UnitKey, activity_keys, exact
 from ir_planner.flexible.cycle_program import CycleLengths, cycle_program, occupied, run_program
@@ -39,6 +39,7 @@ from ir_planner.program import (
     placed_steps,
     rests_at,
 )
+from ir_planner.program.savings import savings_of
 from ir_planner.request import Context
 from ir_planner.service import ServiceLine
 from ir_planner.timing import Movement
@@ -49,7 +50,8 @@ class CycleSaving:
     """A cycle against the common one in the same order: movements as fast as they can, waits as
     the controller spends them by itself. joules, common [J] a part; low, high [J]: 90 % interval of
     what is saved; period, common_period [s]: the same, unless the common one can't keep it;
-    on_motors [J]: of the common one that always waits on motors.
+    on_motors [J]: of the common one that always waits on motors. parts: of a cycle, movements and
+    pauses apart.
     """
 
     joules: float
@@ -59,6 +61,7 @@ class CycleSaving:
     period: float
     common_period: float
     on_motors: float
+    parts: ProgramSavings
 
     @property
     def sentence(self) -> str:
@@ -75,6 +78,19 @@ class CycleSaving:
             f"same order with the controller's own timers, {held}; always on motors that takes "
             f"{self.on_motors / 1e3:.2f} kJ"
         )
+
+
+def _in_time_of(own: Sequence[PlannedMovement], parts: ProgramSavings) -> ProgramSavings:
+    """Savings as those of as many cycles as the planned one makes: the common one may take longer,
+    and each part is held against a part of it.
+    """
+    resting = sum(step.duration for step in own if step.is_pause)
+    moving = sum(step.duration for step in own) - resting
+    return replace(
+        parts,
+        movements=replace(parts.movements, seconds=moving),
+        pauses=replace(parts.pauses, seconds=resting),
+    )
 
 
 class RouteSteps:
@@ -243,18 +259,18 @@ class CycleSteps:
         waiting = self._along(cycle, self._tending.choices).along(common.choice.chain)
         steps = waiting.steps(common.found, by_itself=True)
         own = self.steps
-        energies = [sum(step.report.energy for step in each) for each in (own, steps)]
-        added = sum(spreads.of(steps), np.zeros(1)) - sum(spreads.of(own), np.zeros(1))
+        parts = savings_of(steps, own, len(steps) + len(own), common, spreads.of)
+        total = parts.total
         units = cycle.units
-        saved = interval((energies[1] - energies[0]) / units, added / units)
         return CycleSaving(
-            joules=energies[0] / units,
-            common=energies[1] / units,
-            low=saved.low,
-            high=saved.high,
+            joules=total.planned / units,
+            common=total.common / units,
+            low=total.saved_low / units,
+            high=total.saved_high / units,
             period=self._cycle.period,
             common_period=cycle.period,
-            on_motors=(energies[1] + self._more_on_motors(cycle)) / units,
+            on_motors=(total.common + self._more_on_motors(cycle)) / units,
+            parts=_in_time_of(own, parts),
         )
 
     def _more_on_motors(self, cycle: SteadyCycle) -> float:

@@ -267,7 +267,10 @@ def plan_steady_cycle(
     )
     if saving:
         with journal.stage("saving"):
-            plan = replace(plan, saving=made.saving(Spreads(made.request)))
+            held = made.saving(Spreads(made.request))
+            own = program_of(made.steps)
+            said = replace(held.parts, program_id=own.program_id, sentence=held.sentence)
+            plan = replace(plan, saving=held, program=replace(own, savings=said))
     if cycles:
         try:
             with journal.stage("run"):

@@ -36,6 +36,7 @@ from ir_recorder.analysis.results import (
     mode_name,
 )
 from ir_recorder.analysis.steps import step_label
+from ir_recorder.analysis.tending import Span, Tending
 from ir_recorder.format import contents
 from ir_recorder.reading.recording import Recording
 from ir_values.arrays import FloatArray
@@ -131,12 +132,12 @@ class Production:
 
     @property
     def pace(self) -> float:
-        """Seconds from one cycle of a year to the next: its own where it was driven, of a
-        plan those of the program that it is held against: both make as many.
+        """Seconds from one cycle of a year to the next: those of the program that it is held
+        against, as both make as many, but not less than its own.
         """
-        if self.origin != PREDICTED or self.savings is None:
+        if self.savings is None:
             return self.seconds
-        return self.savings.total.seconds or self.seconds
+        return max(self.savings.total.seconds, self.seconds)
 
     @property
     def supply(self) -> str:
@@ -206,7 +207,7 @@ def _ended(analysis: Analysis) -> str:
 
 
 def _driven(analysis: Analysis, program: ProgramTotals) -> Production | None:
-    """The mean cycle of what was driven; of a route that is the cycle of a part."""
+    """The mean cycle of what was driven; of a route that of a part, the line full."""
     steps = analysis.steps
     ended = sum(result.step.outcome == ENDED for result in steps)
     programs = ended / max(steps[0].step.total, 1)
@@ -220,11 +221,9 @@ def _driven(analysis: Analysis, program: ProgramTotals) -> Production | None:
             f"its last cycle was not driven to the end ({_ended(analysis)}): it counts as "
             f"{cycles % 1.0:.2f} of one"
         )
-    name = "this run" if cycles == 1.0 else f"mean of {cycles:.3g} cycles of this run"
     if analysis.tending is not None:
-        cycles *= len(analysis.tending.parts)
-        filled = ", filling the line included" if analysis.tending.filling else ""
-        name = f"mean of {cycles:.3g} parts of this run{filled}"
+        return _tended(analysis, analysis.tending, whole, notes)
+    name = "this run" if cycles == 1.0 else f"mean of {cycles:.3g} cycles of this run"
     full = program.unshortened
     if full is not None and math.isnan(full.energy):
         notes.append("the pauses of the run are shortened: its year is one of such cycles")
@@ -242,8 +241,8 @@ def _driven(analysis: Analysis, program: ProgramTotals) -> Production | None:
         energy,
         energy,
         cycles,
-        _modes(analysis, full, seconds, energy, cycles),
-        _steps(analysis, full, cycles),
+        _modes(analysis, full, seconds, energy, cycles, _all_of(analysis)),
+        _steps(analysis, full, cycles, _all_of(analysis)),
         _full_savings(analysis.savings, full),
         tuple(notes),
     )
@@ -255,17 +254,48 @@ def _cycles_of_program(recording: Recording) -> int:
     return int(said) if said.isdecimal() and int(said) > 0 else 1
 
 
+def _tended(analysis: Analysis, tending: Tending, whole: Share, notes: Sequence[str]) -> Production:
+    """The mean part while the line was full; of all parts where it never was."""
+    parts = tending.steady or tending.parts
+    count = len(parts)
+    seconds = sum(part.span.seconds for part in parts) / count
+    energy = sum(part.joules for part in parts) / count
+    time = Span(parts[0].span.begin, parts[-1].span.end)
+    filled = "with the line full" if tending.steady else "while the line was filled"
+    mean = "the part" if count == 1 else f"mean of {count} parts"
+    return Production(
+        f"{mean} {filled}",
+        analysis.recording.origin,
+        seconds,
+        energy,
+        energy,
+        energy,
+        whole.seconds / seconds,
+        _modes(analysis, None, seconds, energy, count, time),
+        _steps(analysis, None, count, time),
+        notes=tuple(notes),
+    )
+
+
+def _all_of(analysis: Analysis) -> Span:
+    """The time of the program."""
+    return Span(analysis.steps[0].step.start, analysis.steps[-1].step.end)
+
+
 def _modes(
-    analysis: Analysis, full: Unshortened | None, seconds: float, energy: float, cycles: float
+    analysis: Analysis,
+    full: Unshortened | None,
+    seconds: float,
+    energy: float,
+    cycles: float,
+    time: Span,
 ) -> dict[str, Share]:
-    """Shares of the modes in the program's time; readings at its ends count by their part."""
+    """Shares of the modes in a time; readings at its ends count by their part."""
     power = analysis.recording.power
     if power is None or len(power.time) < 2:
         return {}
-    start = analysis.steps[0].step.start
-    end = analysis.steps[-1].step.end
     since = np.concatenate((power.time[:1], power.time[:-1]))
-    inside = np.minimum(power.time, end) - np.maximum(since, start)
+    inside = np.minimum(power.time, time.end) - np.maximum(since, time.begin)
     known = (inside > 0.0) & np.isfinite(power.power)
     rows = []
     for number in np.unique(power.mode[known]).tolist():
@@ -290,8 +320,14 @@ def _added(program: ProgramTotals | None) -> tuple[FullPause, ...]:
     return full.added if full is not None else ()
 
 
-def _steps(analysis: Analysis, full: Unshortened | None, cycles: float) -> dict[str, Share]:
-    rows = [(result.step.label, result.seconds, result.energy) for result in analysis.steps]
+def _steps(
+    analysis: Analysis, full: Unshortened | None, cycles: float, time: Span
+) -> dict[str, Share]:
+    rows = [
+        (result.step.label, result.seconds, result.energy)
+        for result in analysis.steps
+        if time.begin <= result.step.start <= time.end
+    ]
     if full is not None:
         rows += [
             (analysis.steps[pause.step].step.label, pause.seconds, pause.energy)
@@ -506,11 +542,8 @@ def _planned(analysis: Analysis, planned: Sequence[PlannedMovement]) -> Producti
     )
     steps = _summed((step_label(step), step.duration, step.report.energy) for step in planned)
     low, high = planned_interval(analysis.recording) or (whole.energy, whole.energy)
-    name = "planned program, predicted"
-    if analysis.savings is not None:
-        name = "planned program in its own time, predicted"
-    return Production(
-        name,
+    found = Production(
+        "planned program, predicted",
         PREDICTED,
         whole.seconds,
         whole.energy,
@@ -519,6 +552,27 @@ def _planned(analysis: Analysis, planned: Sequence[PlannedMovement]) -> Producti
         modes=modes,
         steps=steps,
         savings=analysis.savings,
+    )
+    return found if analysis.savings is None else _paced(found, analysis.savings.total)
+
+
+def _paced(plan: Production, total: Saving) -> Production:
+    """A plan in the seconds of the program that it is held against: what it takes then, slower or
+    with a wait at its end, counts as movement.
+    """
+    seconds = total.seconds - plan.seconds
+    energy = total.planned - plan.energy
+    if total.seconds <= 0.0:
+        return plan
+    rows = [(share.name, share.seconds, share.energy) for share in plan.modes.values()]
+    return replace(
+        plan,
+        name="planned program, in the time of the common one, predicted",
+        seconds=total.seconds,
+        energy=total.planned,
+        low=plan.low + energy,
+        high=plan.high + energy,
+        modes=_summed([*rows, (PLANNED_MOVING, seconds, energy)]),
     )
 
 

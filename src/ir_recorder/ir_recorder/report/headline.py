@@ -10,7 +10,6 @@ from ir_msgs_py.savings import one_sided
 from ir_recorder.analysis import Analysis, Finding, ProgramTotals, Share, Verdict, summary
 from ir_recorder.analysis.production import (
     DRIVES_ONLY,
-    PREDICTED,
     Production,
     driven_and_predicted,
     drives_only,
@@ -361,9 +360,7 @@ def yearly_tile(cycle: Production, costs: Costs) -> Tile:
     )
     price = yearly_money(costs.money(energy), costs.currency)
     made = f"{cycles_of_year(cycle.pace, costs)} in shifts, without nights and weekends"
-    planned = cycle.origin == PREDICTED and cycle.savings is not None
-    own = "the plan in its own time, not in that of the common program" if planned else ""
-    lines = (made, co2, assumed, own, cycle.supply)
+    lines = (made, co2, assumed, cycle.supply)
     return Tile("a year of such cycles", price, lines)
 
 
