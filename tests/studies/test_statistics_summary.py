@@ -14,7 +14,6 @@ from ir_studies.statistics.outputs import (
     FEW,
     page_html,
     percent,
-    prediction_words,
     summary_of,
     summed_up,
 )
@@ -93,23 +92,30 @@ def test_figures_that_differ_by_rounding_are_alike() -> None:
 @pytest.mark.parametrize(
     ("shares", "words"),
     [
-        ((0.0, 0.05, 0.1), "The planner predicts 7.2 % too low an energy in the mean (too low in"),
-        ((-0.5, -0.4), "too high an energy"),
+        ((0.0, 0.05, 0.1), "<b>Predicted energies are 7.2 % too low</b>"),
+        ((-0.5, -0.4), "% too high, which may be chance."),
         ((), ""),
     ],
 )
 def test_the_page_says_first_how_far_the_prediction_is_off(
     shares: tuple[float, ...], words: str
 ) -> None:
-    found = findings_of(pairs(*shares))
-    said = prediction_words(found)
-    assert words in said
-    assert bool(said) == bool(shares)
-    page = page_html(found, ASKED)
-    assert ('id="lead"' in page) == bool(shares)
+    page = page_html(findings_of(pairs(*shares)), ASKED)
+    answer = page.partition('<section id="answer">')[2].partition("</section>")[0]
+    assert words in answer
+    assert bool(answer) == bool(shares)
     if shares:
-        assert f"of {2 * len(shares)} measured energies lie in its 90 % interval." in said
-        assert page.index(said) < page.index('class="tile"')
+        assert f"of {2 * len(shares)} measured ones lie in the predicted 90 % interval." in answer
+        assert page.index(answer) < page.index('class="tile"')
+
+
+def test_what_lies_beyond_the_axis_is_an_arrow_at_its_end() -> None:
+    """It was a dot at the edge, as if it lay there."""
+    rows = pairs(*([0.001, -0.001] * 40), 9.0)
+    drawn = page_html(findings_of(rows), ASKED).partition('id="timings"')[2]
+    energy = drawn.partition(">energy, direct</text>")[2].partition('class="name"')[0]
+    assert energy.count('class="out"') == 1
+    assert energy.count("<circle") == 80
 
 
 @pytest.mark.parametrize("shares", [(), (0.1,), (0.1, 0.1), (0.0, 0.0)])
@@ -213,7 +219,7 @@ def test_small_differences_keep_a_digit_and_movements_in_the_interval_are_counte
 def test_settings_stand_as_a_table_without_the_empty_ones() -> None:
     """Once a dictionary in braces."""
     page = page_html(findings_of(pairs(0.1, 0.2)), ASKED)
-    shown = page.partition("<h2>Settings</h2>")[2].partition("</section>")[0].replace("<wbr>", "")
+    shown = page.partition("<h2>Settings</h2>")[2].partition("</details>")[0].replace("<wbr>", "")
     assert "{" not in shown
     for name, value in ASKED.budget.items():
         assert (f"<code>{name}</code>" in shown) == (value not in ("", (), {}))

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ir_recorder.analysis.intervals import ALIKE, Mean
+from ir_recorder.analysis.intervals import ALIKE, LEVEL, Mean
 from ir_recorder.report.bars import tick_step
 from ir_recorder.report.files import write_output
 from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import DASH, significant, text
-from ir_recorder.report.page import PAGE_START
+from ir_recorder.report.page import PAGE_START, folded
 from ir_recorder.report.paid import Tile, row_of
 from ir_recorder.report.shell import Answer
 from ir_recorder.report.step_table import write_columns
@@ -100,8 +100,7 @@ def _tick(percent: float) -> str:
 def _line(each: Comparison, top: float, at: Callable[[float], float]) -> str:
     y = top + LINE / 2.0
     marks = "".join(
-        f'<circle cx="{at(value):.1f}" '
-        f'cy="{y + _SPREAD * (2.0 * (0.618034 * k % 1.0) - 1.0):.1f}" r="2"/>'
+        _dot(value, y + _SPREAD * (2.0 * (0.618034 * k % 1.0) - 1.0), at)
         for k, value in enumerate(each.values.tolist())
     )
     label = f'<text class="name" x="0" y="{y + 4.0:.1f}">{text(each.name)}</text>'
@@ -114,6 +113,15 @@ def _line(each: Comparison, top: float, at: Callable[[float], float]) -> str:
     wide = max(at(each.mean.high) - at(each.mean.low), 2.0)
     bar = f'<rect x="{x:.1f}" y="{y - _BAR / 2.0:.1f}" width="{wide:.1f}" height="{_BAR:g}"/>'
     return label + bar + marks
+
+
+def _dot(value: float, y: float, at: Callable[[float], float]) -> str:
+    """A pair, or where it lies beyond the axis an arrow at its end."""
+    x = at(value)
+    for beyond, way in ((-math.inf, -1.0), (math.inf, 1.0)):
+        if x == at(beyond) and value != 0.0:
+            return f'<path class="out" d="M{x:.1f} {y - 3:.1f}l{5 * way:g} 3l{-5 * way:g} 3z"/>'
+    return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2"/>'
 
 
 _CSV_START = b"pair,"
@@ -152,7 +160,7 @@ _PORTFOLIO_RULE = (
     "predicted: a rule, no finding."
 )
 _ONE_ROBOT = f"One robot says little of the predicted interval; plant: {DRAWN} draws one per pair."
-_FIRST = ("duration", "energy, direct")
+_FIRST = ("duration", "energy, direct", "predicted against direct")
 """Comparisons that people look for first."""
 _SCOPE = (
     "Energies are at the mains, controller and tool included, of simulated robots; nothing "
@@ -292,13 +300,13 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
     parts = {
         "tiles": row_of(_tiles(found)),
         "counts": table(("", ">how many"), [(text(a), b) for a, b in counts(found)], "Counts"),
-        "verdict": "".join(f"<li>{text(one)}</li>" for one in _in_words(found)),
-        "bold": "" if any(each.shown for each in found.comparisons) else ": here none does",
+        "timings": text(_timings(found)),
+        "predicted": text(_predicted(found)[0] or "No energy was measured"),
         "notes": "".join(f"<li>{text(note)}</li>" for note in notes(found, settings)),
         "comparisons": _table(
             found.comparisons, "Asynchronous against synchronous", (">asynchronous", ">synchronous")
         ),
-        "left_out": _left_out(found),
+        "left_out": folded(_left_out(found), paper=True),
         "comparison_dots": dots(
             found.comparisons, "asynchronous less synchronous, in percent of synchronous"
         ),
@@ -312,39 +320,75 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
 
 
 def _answer(found: Findings) -> Answer | None:
-    """How true predicted energies are, how sure that is, and what follows for users."""
-    words = prediction_words(found)
-    return Answer(words, "") if words else None
+    """How true predicted energies are, what the timings change, how sure both are, and what
+    follows.
+    """
+    result, words = _predicted(found)
+    if not result:
+        return Answer(_timings(found), "", _SCOPE) if found.solved > found.same else None
+    each = _against_direct(found)
+    assert each is not None
+    sure = f"Over {counted(each.pairs, 'pair')} of places. {_SCOPE}"
+    if math.isfinite(each.mean.low):
+        sure = f"90 % interval {_interval(each.mean)} %. {sure}"
+    advice = []
+    if each.outside:
+        factor = 1.0 / (1.0 + 0.01 * each.mean.value)
+        advice.append(
+            f"Multiply predicted energies of such a robot by {factor:.3f}, or fit its power "
+            "parameters to a meter (ir energy fit)."
+        )
+    if not any(one.shown for one in found.comparisons):
+        advice.append("Take either timing: neither is shown to be better.")
+    return Answer(result, f"{words} {_timings(found)}.", sure, " ".join(advice))
 
 
 def _verdict(found: Findings) -> tuple[str, bool]:
-    """The badge: whether the timings differ."""
-    shown = sum(each.shown for each in found.comparisons)
+    """The badge: how many of the measured energies lie where they were predicted."""
+    if not found.driven or not math.isfinite(found.covered):
+        return "", False
+    inside = round(found.covered * found.driven)
+    words = f"{inside} of {found.driven} energies in the predicted interval"
+    return words, found.covered >= LEVEL
+
+
+def _timings(found: Findings) -> str:
+    """What joints' own laws change, in a sentence without its full stop."""
+    shown = [each for each in found.comparisons if each.shown]
     if not shown:
-        return "Timings: no difference shown", False
-    return f"Timings: {counted(shown, 'difference')} shown", True
+        return "No change by asynchronous joints is shown"
+    said = [f"{each.name} {percent(each.mean.value)} % ({_interval(each.mean)})" for each in shown]
+    return f"Asynchronous joints change {', '.join(said)} in the mean"
 
 
-def prediction_words(found: Findings) -> str:
+def _against_direct(found: Findings) -> Comparison | None:
+    """Predicted against measured energies; None where none was measured."""
+    each = next((one for one in found.agreements if one.name.startswith("predicted")), None)
+    return each if each is not None and math.isfinite(each.mean.value) else None
+
+
+def _predicted(found: Findings) -> tuple[str, str]:
     """How far and in which direction predicted energies lie from measured ones, and how often the
     measured one lies in the interval; "" where none was measured.
     """
-    each = next((one for one in found.agreements if one.name.startswith("predicted")), None)
-    if each is None or not math.isfinite(each.mean.value):
-        return ""
+    each = _against_direct(found)
+    if each is None:
+        return "", ""
     low = each.mean.value < 0.0
     side = "low" if low else "high"
-    size = significant(abs(each.mean.value), 2)
-    often = f"too {side} in {each.less if low else each.more} of {each.count} movements"
-    said = f"The planner predicts {size} % too {side} an energy in the mean ({often})"
+    result = f"Predicted energies are {significant(abs(each.mean.value), 2)} % too {side}"
+    words = (
+        f"In the mean; too {side} in {each.less if low else each.more} of {each.count} movements."
+    )
     if abs(each.mean.value) < ALIKE:
-        said = "The planner predicts the energy without a difference in the mean"
+        result, words = "Predicted energies are right", "In the mean."
     elif math.isfinite(each.mean.low) and not each.outside:
-        said += ", which may be chance"
+        words = f"In the mean: {result.lower()}, which may be chance."
+        result = "Predicted energies are not shown to be off"
     if math.isfinite(found.covered):
         inside = round(found.covered * found.driven)
-        said += f"; {inside} of {found.driven} measured energies lie in its 90 % interval"
-    return f"{said}."
+        words += f" {inside} of {found.driven} measured ones lie in the predicted 90 % interval."
+    return result, words
 
 
 def _tiles(found: Findings) -> list[Tile]:
@@ -354,43 +398,15 @@ def _tiles(found: Findings) -> list[Tile]:
     compared = found.solved - found.same
     both = f"{found.solved} with both timings certified"
     tiles = [Tile("pairs compared", f"{compared} of {found.pairs}", (both,))]
-    named = [each for each in found.comparisons if each.name in _FIRST]
-    for each in (*named, *found.agreements):
-        if not math.isfinite(each.mean.value):
+    timing = "asynchronous against synchronous"
+    for each in (*found.comparisons, *found.agreements):
+        if not math.isfinite(each.mean.value) or each.name not in _FIRST:
             continue
         within = f"90 % interval {_interval(each.mean)} %" if math.isfinite(each.mean.low) else ""
-        verdict = ""
-        if each in named:
-            verdict = "asynchronous against synchronous"
-            verdict += "" if each.shown else "; no difference shown"
-        tiles.append(Tile(each.name, f"{percent(each.mean.value)} %", (within, verdict)))
-    if found.driven and math.isfinite(found.covered):
-        inside = f"{round(found.covered * found.driven)} of {found.driven}"
-        tiles.append(Tile("measured within the prediction", inside, ("its 90 % interval",)))
+        of = timing if each in found.comparisons else "of a movement's energy"
+        verdict = "" if each.shown else "no difference shown"
+        tiles.append(Tile(each.name, f"{percent(each.mean.value)} %", (within, of, verdict)))
     return tiles
-
-
-def _in_words(found: Findings) -> Iterator[str]:
-    """The results in sentences, the comparison of the timings first."""
-    shown = [each for each in found.comparisons if each.shown]
-    if not shown:
-        pairs = max((each.pairs for each in found.comparisons), default=0)
-        yield (
-            f"Of {pairs} pairs that differ no quantity is shown to be larger or smaller with "
-            "asynchronous joints."
-        )
-    for each in shown:
-        yield (
-            f"Asynchronous joints: {each.name} {percent(each.mean.value)} % in the mean "
-            f"({_interval(each.mean)}), of {each.pairs} pairs."
-        )
-    for each in found.agreements:
-        if math.isfinite(each.mean.value):
-            within = f" ({_interval(each.mean)})" if math.isfinite(each.mean.low) else ""
-            yield (
-                f"Energy {each.name}: {percent(each.mean.value)} % in the mean{within}, of "
-                f"{each.pairs} pairs."
-            )
 
 
 def summed_up(found: Findings) -> str:
