@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ir_kernels import portable
 from ir_values.arrays import FloatArray, frozen
 from ir_values.errors import InvalidValueError
+from ir_values.rotations import rotations_from_unit_quaternions
 
 QUATERNION_TOLERANCE = 1e-3
 """A quaternion this far from unit length is normalised, beyond it is refused."""
@@ -94,14 +95,7 @@ def rotation_from_quaternion(xyzw: ArrayLike) -> FloatArray:
             f"quaternion has length {length:g}, must be 1 within {QUATERNION_TOLERANCE:g} (order "
             "x, y, z, w)"
         )
-    x, y, z, w = q / length
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return rotations_from_unit_quaternions(q / length)
 
 
 def rotation_from_matrix(rows: ArrayLike) -> FloatArray:

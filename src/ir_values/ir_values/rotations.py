@@ -51,10 +51,15 @@ def rotations_from_quaternions(quaternions: FloatArray) -> FloatArray:
     q = np.asarray(quaternions, dtype=np.float64)
     x, y, z, w = (q[..., k] for k in range(4))
     length = np.sqrt(x * x + y * y + z * z + w * w)
-    x, y, z, w = (each / length for each in (x, y, z, w))
+    return rotations_from_unit_quaternions(q / length[..., None])
+
+
+def rotations_from_unit_quaternions(quaternions: FloatArray) -> FloatArray:
+    """Rotations (..., 3, 3) of quaternions (..., 4) x, y, z, w of length 1."""
+    x, y, z, w = (quaternions[..., k] for k in range(4))
     rows = (
-        (x * x - y * y - z * z + w * w, 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
-        (2.0 * (x * y + z * w), -(x * x) + y * y - z * z + w * w, 2.0 * (y * z - x * w)),
-        (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), -(x * x) - y * y + z * z + w * w),
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
+        (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
+        (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
     )
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ir_kernels import portable
 from ir_values.arrays import FloatArray
-from ir_values.rotations import quaternions_from_rotations
+from ir_values.rotations import quaternions_from_rotations, rotations_from_unit_quaternions
 
 _SMALL = 1e-2  # rad: below, series to the fourth power are exact to rounding
 _ITERATIONS = 10
@@ -26,14 +26,10 @@ def rotation_of(vectors: FloatArray) -> FloatArray:
     half = np.where(
         small, 0.5 - square / 48.0 + (square * square) / 3840.0, portable.sin(0.5 * safe) / safe
     )
-    x, y, z = np.moveaxis(v * half[..., None], -1, 0)
-    w = np.asarray(portable.cos(0.5 * angle))
-    rows = [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
-        [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
-        [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    cosine = np.asarray(portable.cos(0.5 * angle))
+    return rotations_from_unit_quaternions(
+        np.concatenate([v * half[..., None], cosine[..., None]], axis=-1)
+    )
 
 
 def rotation_vector(rotations: FloatArray) -> FloatArray:
