@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from ir_msgs_py.options import PlanOptions
 from ir_planner.regional import MovementPlan
-from ir_planner.regional.regional import plan_regional
+from ir_planner.regional.regional import plan_to_configurations
 from ir_planner.request import Context, Journal, Work
 from ir_planner.scene import PlanningScene
 from ir_planner.search import SEARCHES, Search
@@ -21,6 +21,6 @@ def planned(
     work: Work,
     searches: Mapping[str, Search] = SEARCHES,
 ) -> MovementPlan:
-    return plan_regional(
+    return plan_to_configurations(
         start, goals, Context(scene, options, Journal(work, options.seed)), searches
     )

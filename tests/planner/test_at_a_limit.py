@@ -12,7 +12,7 @@ import pytest
 from ir_description.robot import LIMIT_TOLERANCE
 from ir_msgs_py.options import PlanOptions
 from ir_planner import MovementPlan, Planner, Reference, RequestError
-from ir_planner.regional.regional import plan_regional
+from ir_planner.regional.regional import plan_to_configurations
 from ir_planner.request import Context, Work
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # the judge of poses
@@ -71,7 +71,7 @@ def by_function(planner: Planner, start: np.ndarray, goal: np.ndarray) -> Moveme
     options = PlanOptions()
     work = Work(2000, np.inf, lambda: 0.0)
     context = Context.of(planner.scene(), options, work)
-    return plan_regional(start, goal, context, planner.settings.searches)
+    return plan_to_configurations(start, goal, context, planner.settings.searches)
 
 
 DOORS = {

@@ -22,7 +22,7 @@ from ir_planner.program.bounds import (
     least_seconds,
     potential_energy,
 )
-from ir_planner.regional.regional import plan_regional
+from ir_planner.regional.regional import plan_to_configurations
 from ir_planner.request.context import Context, Journal, Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.search.registry import registered
@@ -56,7 +56,7 @@ def configurations(rng: np.random.Generator, count: int) -> np.ndarray:
 def test_no_movement_of_the_planner_costs_less(seed: int, rates: Rates) -> None:
     a, b = configurations(np.random.default_rng(seed), 2)
     options = PlanOptions(safety_distance=0.0, time_value=rates.second if rates.joule else 500.0)
-    plan = plan_regional(a, b[None], asked(SCENE, options), registered())
+    plan = plan_to_configurations(a, b[None], asked(SCENE, options), registered())
     assert plan.trajectory is not None
     report = evaluate_trajectory(plan.trajectory, SCENE, 0.0).report
     cost = rates.joule * (report.energy - report.base_energy) + rates.second * report.duration
@@ -101,7 +101,7 @@ def test_a_coarse_solution_less_its_margin_is_below_the_planner_s_movement(
     postures = np.array([scene.cell.park, scene.cell.machine_home])
     turned = postures + np.radians([60.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     for a, b in zip(postures, turned, strict=True):
-        plan = plan_regional(a, b[None], asked(scene, options), registered())
+        plan = plan_to_configurations(a, b[None], asked(scene, options), registered())
         if plan.trajectory is None:
             continue
         report = plan.report

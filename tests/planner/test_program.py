@@ -20,7 +20,7 @@ from ir_planner.planner import Planner
 from ir_planner.program.chain import TOLERANCE, layers_of
 from ir_planner.program.program import ProgramPlan, ProgramRequest, plan_program
 from ir_planner.program.steps import Route, Scenes, placed_steps, steps_of
-from ir_planner.regional.regional import plan_regional
+from ir_planner.regional.regional import plan_to_configurations
 from ir_planner.request.context import Context, Journal, Work
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.search.registry import registered
@@ -293,7 +293,7 @@ def test_the_chain_is_the_cheapest_of_all_that_the_planner_can_move_along(
             entry = timed_service(there.line, True, asked(scene).at(stations[hop])).report
             for a, before in total.items():
                 here = layers[hop][max(a, 0)]
-                across = plan_regional(
+                across = plan_to_configurations(
                     here.departure, there.arrival[None], asked(scene), registered()
                 )
                 chain = before + cost(across.report) + cost(entry)

@@ -5,6 +5,14 @@ the registry. From the first free path on the answer gets better with work: gues
 many homotopy classes descend by gradient, and the cheapest to the best path and time scaling near
 them, certified. Nothing found is an answer too: which pair blocks, where, by how much, and what was
 tried.
+
+One direction, each calls those below it:
+
+    search_regional          this module: the request, its ends, the refusal
+    └── best_found           safeguards: the request's own run, and companions that ask otherwise
+        └── improve          exploration: one run, paths of more homotopy classes turn by turn
+            └── Portfolio    optimize: the paths of a run, the cheapest refined
+                └── Refinement    optimize: one path, the descent to a certified movement
 """
 
 from dataclasses import dataclass
@@ -124,7 +132,7 @@ def refusal(
 _TIMED = 3
 
 
-def plan_regional(
+def plan_to_configurations(
     start: FloatArray, goals: FloatArray, context: Context, searches: Searches
 ) -> MovementPlan:
     """Movement from start (n,) to a goal (n,), or to the best reachable of goals (G, n), cheapest
@@ -185,10 +193,10 @@ def _search_timed(
     start: FloatArray, goals: FloatArray, context: Context, searches: Searches
 ) -> tuple[Status, Movement | None]:
     """The same with the torque that the context's reserve leaves."""
-    if context.options.timing == "asynchronous":
-        synchronous = context.with_timing("synchronous")
-        return with_own_laws(context, lambda: _search(start, goals, synchronous, searches))
-    return _search(start, goals, context, searches)
+    if context.options.timing != "asynchronous":
+        return _search(start, goals, context, searches)
+    status, found = _search(start, goals, context.with_timing("synchronous"), searches)
+    return status, None if found is None else with_own_laws(found, context)
 
 
 def _search(
@@ -290,7 +298,7 @@ def plan_to_goal(
     RequestError.
     """
     if goal.configuration is not None:
-        return plan_regional(start, goal.configuration[None], context, searches)
+        return plan_to_configurations(start, goal.configuration[None], context, searches)
     assert goal.pose is not None  # a Goal has one of both
     found = free_configurations(goal.pose, context.scene, context.thresholds(), start)
     if len(found.q) == 0:
@@ -298,4 +306,4 @@ def plan_to_goal(
         return MovementPlan(
             status, context.journal.info(start, context.joint_names), TrajectoryReport()
         )
-    return plan_regional(start, found.q, context, searches)
+    return plan_to_configurations(start, found.q, context, searches)

@@ -22,7 +22,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_msgs_py.status import Status
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import RequestError, TimingError
 from ir_planner.optimize import Portfolio, Refinement, path_of
@@ -300,42 +299,26 @@ def over_free_steps(movement: Movement, space: FreeSpace) -> Movement:
     return movement if along is None else movement.passing(along)
 
 
-Found = tuple[Status, Movement | None]
 LATE = "timing is synchronous: no time was left for own laws of the joints"
 SYNCHRONOUS = "timing is synchronous: own laws for the joints serve no better"
 
 
-def with_own_laws(context: Context, synchronous: Callable[[], Found]) -> Found:
+def with_own_laws(synchronous: Movement, context: Context) -> Movement:
     """The better of the synchronous answer and of the same free path in straight steps, each joint
     with its own law; it notes when it is the synchronous one. The synchronous one too where
     planning_time is over.
-
-    Raises what `synchronous` raises where own laws don't serve either.
     """
-    refused: RequestError | None = None
-    try:
-        status, common = synchronous()
-    except RequestError as error:
-        status = Status.success()
-        common = None
-        refused = error
     with context.journal.stage("asynchronous") as notes:
-        if common is not None and _too_late(context):
+        if _too_late(context):
             notes.append(LATE)
-            return status, common
-        own = None if common is None else _own(common, context)
-        if (
-            own is not None
-            and common is not None
-            and (_as_named(context) or own.cost <= common.cost)
-        ):
-            notes.append(own.note or "each joint has its own law")
-            context.journal.timing = own.timing
-            return status, own
-        notes.append(SYNCHRONOUS)
-    if refused is not None:
-        raise refused
-    return status, common
+            return synchronous
+        own = _own(synchronous, context)
+        if own is None or not (_as_named(context) or own.cost <= synchronous.cost):
+            notes.append(SYNCHRONOUS)
+            return synchronous
+        notes.append(own.note or "each joint has its own law")
+        context.journal.timing = own.timing
+        return own
 
 
 def _too_late(context: Context) -> bool:
@@ -348,7 +331,7 @@ def _as_named(context: Context) -> bool:
     return context.options.planner_id == DIRECT and context.options.objective != "time"
 
 
-def _own(common: Movement, context: Context) -> Movement | None:
+def _own(synchronous: Movement, context: Context) -> Movement | None:
     """The movement over the free path that the synchronous one came from; None where no joint has a
     law of its own, or it isn't certified.
     """
@@ -356,7 +339,7 @@ def _own(common: Movement, context: Context) -> Movement | None:
         space = FreeSpace.of(
             context.scene, context.safety_distance, context.work, cone=context.cone
         )
-        movement = straight_steps(over_free_steps(common, space).path, context)
+        movement = straight_steps(over_free_steps(synchronous, space).path, context)
     except (TimingError, RequestError) as error:
         context.journal.reject(f"own laws: {error}")
         return None
