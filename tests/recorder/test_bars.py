@@ -59,3 +59,11 @@ def test_a_bar_without_an_interval_has_no_whisker() -> None:
 
 def _pieces(shown: str) -> list[re.Match[str]]:
     return list(re.finditer(r'class="piece (\w+)" style="left:([\d.]+)%;width:([\d.]+)%', shown))
+
+
+def test_an_interval_that_reaches_below_zero_is_drawn_whole() -> None:
+    """It began left of the track."""
+    row = Row("best", (Piece("planned", "saved", 2.0),), "2", whisker=(-1.0, 3.0))
+    drawn = bars([row], "saved")
+    left, width = re.findall(r'class="whisker" style="left:([\d.-]+)%;width:([\d.]+)%', drawn)[0]
+    assert (float(left), float(width)) == (0.0, 100.0)

@@ -113,9 +113,10 @@ def test_what_is_left_behind(laid: Laid, tmp_path: Path) -> None:
     page = (tmp_path / "out" / "index.html").read_text()
     assert "https://" not in page
     assert "{{" not in page
-    lead = page.partition('id="lead"')[2].partition("</section>")[0]
-    assert "The best placement saves" in lead or "leave everything where it stands" in lead
-    assert " EUR a year" in lead or "leave everything" in lead
+    answer = page.partition('id="answer"')[2].partition("</section>")[0]
+    assert " EUR less a year</b>" in answer or "No placement is shown to save" in answer
+    assert "Leave everything where it stands" in answer or "Plan best_1.yaml" in answer
+    assert "90 % interval" in answer
     assert (
         page.count('class="given"') > page.partition('class="maps"')[0].count('class="given"') > 0
     )

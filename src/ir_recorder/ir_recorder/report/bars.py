@@ -68,6 +68,12 @@ class Row:
         ends = [self.taken, *(mark.value for mark in self.marks), *self.whisker]
         return max(end for end in ends if math.isfinite(end))
 
+    @property
+    def leftmost(self) -> float:
+        """What lies farthest to the left, at most zero."""
+        ends = [self.given, *(mark.value for mark in self.marks), *self.whisker]
+        return min(0.0, *(end for end in ends if math.isfinite(end)))
+
 
 @dataclass(frozen=True)
 class _Scale:
@@ -84,7 +90,7 @@ def bars(rows: Sequence[Row], name: str, axis: Callable[[float], str] | None = N
     """The bars, called `name` where they are written as a drawing; with an axis whose values are
     shown so.
     """
-    scale = _Scale(min(row.given for row in rows), max(1e-9, *(row.farthest for row in rows)))
+    scale = _Scale(min(row.leftmost for row in rows), max(1e-9, *(row.farthest for row in rows)))
     drawn = "".join(_row(row, scale) for row in rows)
     head = _axis(scale, axis) if axis is not None else ""
     return f'<div class="bars" data-name="{text(name)}">{head}{drawn}</div>'

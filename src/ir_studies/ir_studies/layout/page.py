@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TypeAlias
 
@@ -17,7 +17,7 @@ from ir_description import Cell, cell_to_yaml
 from ir_planner.checks import JouleInterval
 from ir_recorder.analysis.production import Amount
 from ir_recorder.report.bars import Piece, Row, bars
-from ir_recorder.report.costs import Costs, assumed_section, cycles_of_year, yearly_money
+from ir_recorder.report.costs import Costs, assumed_section, payback, yearly_money, yearly_span
 from ir_recorder.report.files import write_output
 from ir_recorder.report.number_text import (
     DASH,
@@ -37,7 +37,14 @@ from ir_recorder.report.tables import table
 from ir_studies.layout.placement import Known, Variable
 from ir_studies.layout.search import GIVEN
 from ir_studies.layout.settings import LayoutSettings, PlacementCondition
-from ir_studies.layout.summary import Final, cost_words, ends, of_condition, sentences
+from ir_studies.layout.summary import (
+    Final,
+    cost_words,
+    ends,
+    given_reason,
+    of_condition,
+    sentences,
+)
 from ir_studies.page import Head, page, settings_table
 from ir_values.arrays import FloatArray
 from ir_values.files import ANYWHERE
@@ -195,8 +202,8 @@ _MOSTLY = 0.5  # of the corners of an outline
 _MACHINE = "equipment."  # before the name of an owner that is one
 _SENTENCE = 300  # characters of a reason
 _HEADS = (
-    "placement", "for", ">energy of a cycle, 90 % interval", ">between seeds",
-    ">less than given, 90 % interval", ">movements", ">duration", ">clearance",
+    "placement", "for", ">saved a year", ">saved a cycle", ">energy of a cycle", ">movements",
+    ">duration", ">clearance", ">between seeds",
 )  # fmt: skip
 
 
@@ -226,15 +233,15 @@ def page_html(
     head = Head(
         f"Layout of {cell.name}",
         f"{len(known)} placements, {len(settings.variables)} variables; energies are predicted",
-        _answer(finals, costs),
+        _answer(known, finals, costs),
         "Predicted, not driven",
     )
     parts = {
-        "tiles": _tiles(known, finals, costs),
-        "bars": _bars(finals),
+        "tiles": _tiles(known, finals),
+        "bars": _bars(finals, costs),
         "assumed": assumed_section(costs),
-        "verdict": f"<ul>{said}</ul>",
-        "best": table(_HEADS, _rows(finals), "The best placements"),
+        "searched": f"<ul>{said}</ul>",
+        "best": table(_HEADS, _rows(finals, costs), "The best placements"),
         "map": "".join(_maps(known, finals, settings, cell)),
         "cost": text(cost_words(settings)),
         "beside": _beside(finals, settings),
@@ -246,25 +253,61 @@ def page_html(
     return page("layout", head, parts)
 
 
-def _answer(finals: Sequence[Sequence[Final]], costs: Costs) -> Answer | None:
-    """Whether moving anything pays, in money of a year; "" where there is nothing to compare."""
+def _answer(
+    known: Sequence[Known], finals: Sequence[Sequence[Final]], costs: Costs
+) -> Answer | None:
+    """Whether moving anything pays, in money of a year, how sure that is, and what to do."""
     given, best = ends(finals)
-    if given is None or best is None:
+    if best is None:
         return None
-    like = of_condition(given, best[0])
-    less, within = best[0].saving(like)
-    year = costs.money(less * costs.cycles_per_year(like.mean("duration_s")))
-    span = span_of(within.low, within.high, kilowatt_hours)
-    saved = f"{kilowatt_hours(less)} of {kilowatt_hours(like.mean())} a cycle, {span}"
-    if less <= 0.0 or within.low <= 0.0:
-        return Answer("No placement is shown to save energy: leave everything where it stands.", "")
-    said = f"The best placement saves {yearly_money(year, costs.currency)} a year ({saved})"
-    if year < costs.engineer_hour:
+    if given is None:
+        do = "Use one of the others: best_1.yaml costs least."
+        return Answer("As given it is impossible", given_reason(known), "", do)
+    one = best[0]
+    like = of_condition(given, one)
+    year = _year(one, like, costs)
+    share = percent(year.energy.value / like.mean()).lstrip("+")
+    moving = 1.0 - one.mean("moving_j") / like.mean("moving_j")
+    moved = f"{percent(abs(moving)).lstrip('+')} {'less' if moving >= 0.0 else 'more'}"
+    words = (
+        f"by the best placement: {kilowatt_hours(year.energy.value)} of "
+        f"{kilowatt_hours(like.mean())} a cycle ({share}); the movements alone take {moved}."
+    )
+    ends_of = yearly_span(year.money.low, year.money.high)
+    sure = (
+        f"90 % interval {ends_of} {costs.currency}, over robots as the data sheet allows them; "
+        f"{kilowatt_hours(one.spread())} a cycle between seeds. Predicted, not driven."
+    )
+    if year.money.value <= 0.0 or year.money.low <= 0.0:
+        result = "No placement is shown to save"
+        return Answer(result, "", sure, "Leave everything where it stands.")
+    result = f"{yearly_money(year.money.value, costs.currency)} less a year"
+    if year.money.value < costs.engineer_hour:
         hour = f"{costs.engineer_hour:g} {costs.currency}"
-        return Answer(
-            f"{said}, less than one hour of an engineer ({hour}): nothing is worth moving.", ""
-        )
-    return Answer(f"{said}.", "")
+        do = f"Leave everything where it stands: less than one hour of an engineer ({hour})."
+        return Answer(result, words, sure, do)
+    do = (
+        f"{payback(year.money, costs).capitalize()}. Plan best_1.yaml, and look at cables, ways of "
+        "people and how parts come, which no study knows."
+    )
+    return Answer(result, words, sure, do)
+
+
+@dataclass(frozen=True)
+class _Year:
+    """What a placement saves of the given one: joules of a cycle, and money of a year of the given
+    one's cycles.
+    """
+
+    energy: Amount
+    money: Amount
+
+
+def _year(one: Final, like: Final, costs: Costs) -> _Year:
+    less, within = one.saving(like)
+    energy = Amount(less, within.low, within.high)
+    cycles = costs.cycles_per_year(like.mean("duration_s"))
+    return _Year(energy, energy.times(cycles).of(costs.money))
 
 
 def _beside(finals: Sequence[Sequence[Final]], settings: LayoutSettings) -> str:
@@ -280,79 +323,90 @@ def _beside(finals: Sequence[Sequence[Final]], settings: LayoutSettings) -> str:
     )
 
 
-def _bars(finals: Sequence[Sequence[Final]]) -> str:
-    """Energy of a cycle as given and of the best, with their intervals; "" where nothing was
-    planned.
+def _bars(finals: Sequence[Sequence[Final]], costs: Costs) -> str:
+    """What each of the best saves of the given one in a year, with its interval; "" where there is
+    nothing to compare.
     """
+    given, _ = ends(finals)
+    if given is None:
+        return ""
     rows = []
-    rank = 0
-    for own in finals:
-        rank += not own[0].is_given
-        name = "as given" if own[0].is_given else f"best_{rank}.yaml"
+    for rank, own in enumerate((own for own in finals if not own[0].is_given), start=1):
         for one in own:
             if not one.solved:
                 continue
-            energy = kilowatt_hours(one.mean())
-            within = one.interval
-            between = span_of(within.low, within.high, kilowatt_hours)
-            style = "today" if one.is_given else "planned"
+            year = _year(one, of_condition(given, one), costs)
+            price = yearly_money(year.money.value, costs.currency)
+            between = yearly_span(year.money.low, year.money.high)
+            name = f"best_{rank}.yaml"
+            first = one is own[0]
+            notes = (
+                f"{between} {costs.currency}; {kilowatt_hours(year.energy.value)} a cycle",
+                *(_moved(one) if first else ()),
+            )
+            style = "planned" if year.money.value >= 0.0 else "today"
             rows.append(
                 Row(
                     name if len(own) == 1 else f"{name}, {one.condition.text}",
-                    (Piece(style, energy, one.mean()),),
-                    energy,
-                    (f"90 % interval {between}", f"in {seconds(one.mean('duration_s'))}"),
-                    whisker=(within.low, within.high),
+                    (Piece(style, price, year.money.value),),
+                    price,
+                    notes,
+                    whisker=(year.money.low, year.money.high),
                 )
             )
-    return bars(rows, "energy of a cycle") if rows else ""
+    if not rows:
+        return ""
+    like = given[0]
+    cost = costs.money(like.mean() * costs.cycles_per_year(like.mean("duration_s")))
+    hint = (
+        f"Zero is the layout as given: {kilowatt_hours(like.mean())} a cycle, "
+        f"{yearly_money(cost, costs.currency)} a year. Right of it a placement saves. Whisker: "
+        "90 % interval of the difference. Below: what stands how far from where it is given."
+    )
+    drawn = bars(rows, "saved a year")
+    return f'{drawn}<p class="hint">{text(hint)}</p>'
 
 
-def _tiles(known: Sequence[Known], finals: Sequence[Sequence[Final]], costs: Costs) -> str:
-    """The best of the others against the given placement, under the first condition."""
+def _tiles(known: Sequence[Known], finals: Sequence[Sequence[Final]]) -> str:
+    """A cycle of the best beside that of the given placement, under the first condition."""
     given, best = ends(finals)
     impossible = sum(one.cost == math.inf for one in known)
-    looked = Tile("placements", str(len(known)), (f"{impossible} of them impossible",))
+    looked = Tile("placements looked at", str(len(known)), (f"{impossible} of them impossible",))
     if given is None or best is None:
         return row_of([looked])
     one = best[0]
     like = of_condition(given, one)
-    less, within = one.saving(like)
-    word, gain = Amount(less, within.low, within.high).gain()
-    share = percent(gain.value / like.mean()).lstrip("+")
-    between = span_of(gain.low, gain.high, kilowatt_hours)
-    pace = like.mean("duration_s")
-    cycles = costs.cycles_per_year(pace)
-    moving = 1.0 - one.mean("moving_j") / like.mean("moving_j")
-    moved = f"{percent(abs(moving)).lstrip('+')} {'less' if moving >= 0.0 else 'more'}"
-    saved = "saved a cycle by the best" if word == "saved" else "more a cycle by the best"
+    within = one.interval
+    several = len(best) > 1
     return row_of(
         [
             Tile(
-                saved, kilowatt_hours(gain.value), (share, f"90 % interval {between}", gain.doubt)
-            ),
-            Tile(
-                "energy of a cycle",
+                "energy of a cycle by the best",
                 kilowatt_hours(one.mean()),
-                (f"as given {kilowatt_hours(like.mean())}", "at the mains, predicted"),
-            ),
-            Tile(
-                f"{word} a year by the best",
-                yearly_money(costs.money(gain.value * cycles), costs.currency),
                 (
-                    f"{cycles_of_year(pace, costs)}",
-                    f"{costs.price:g} {costs.currency}/kWh and shifts assumed",
+                    _against(like.mean() - one.mean(), kilowatt_hours),
+                    f"90 % interval {span_of(within.low, within.high, kilowatt_hours)}",
+                    one.condition.text if several else "",
                 ),
             ),
-            Tile("movements alone", moved, ("than as given",)),
+            Tile(
+                "its movements alone",
+                kilowatt_hours(one.mean("moving_j")),
+                (_against(like.mean("moving_j") - one.mean("moving_j"), kilowatt_hours),),
+            ),
             Tile(
                 "cycle time",
                 seconds(one.mean("duration_s")),
-                (f"as given {seconds(like.mean('duration_s'))}", one.condition.text),
+                (_against(like.mean("duration_s") - one.mean("duration_s"), seconds),),
             ),
             looked,
         ]
     )
+
+
+def _against(less: float, show: Callable[[float], str]) -> str:
+    """By how much a figure is less or more than as given."""
+    return f"{show(abs(less))} {'less' if less >= 0.0 else 'more'} than as given"
 
 
 def _briefly(sentence: str, finals: Sequence[Sequence[Final]]) -> str:
@@ -361,10 +415,8 @@ def _briefly(sentence: str, finals: Sequence[Sequence[Final]]) -> str:
     return sentence.replace(best[0].placement.key, "best_1.yaml") if best else sentence
 
 
-def _moved(one: Final, rank: int) -> str:
-    """The cell file of a placement, and below it what stands how far from where it is given."""
-    if one.is_given:
-        return "<b>as given</b>"
+def _moved(one: Final) -> list[str]:
+    """What stands how far from where it is given, a line for each."""
     by: dict[str, list[str]] = {}
     for name, value in sorted(one.placement.values.items()):
         owner, _, part = name.removeprefix(_MACHINE).rpartition(".")
@@ -372,37 +424,42 @@ def _moved(one: Final, rank: int) -> str:
         shown = f"{part.removesuffix('_deg')} {value:+g}{unit}"
         if value:
             by.setdefault(owner, []).append(shown)
-    lines = (f"<small>{text(owner)}: {text(', '.join(own))}</small>" for owner, own in by.items())
-    return f"<b>best_{rank}.yaml</b>{''.join(lines)}"
+    return [f"{owner}: {', '.join(own)}" for owner, own in by.items()]
 
 
-def _rows(finals: Sequence[Sequence[Final]]) -> Iterator[tuple[str, ...]]:
+def _rows(finals: Sequence[Sequence[Final]], costs: Costs) -> Iterator[tuple[str, ...]]:
     given, _ = ends(finals)
     rank = 0
     for own in finals:
         rank += not own[0].is_given
         for one in own:
-            name = _moved(one, rank)
+            name = "as given" if one.is_given else f"best_{rank}.yaml"
             if not one.solved:
                 yield name, text(one.condition.text), *[DASH] * (len(_HEADS) - 2)
                 continue
-            less = DASH
+            less = money = DASH
             if given is not None and not one.is_given:
                 like = of_condition(given, one)
-                saved, between = one.saving(like)
-                share = percent(saved / like.mean()).lstrip("+")
-                less = _with_interval(f"{kilowatt_hours(saved)} ({share})", between)
+                year = _year(one, like, costs)
+                share = percent(year.energy.value / like.mean()).lstrip("+")
+                less = _with_interval(f"{kilowatt_hours(year.energy.value)} ({share})", year.energy)
+                between = yearly_span(year.money.low, year.money.high)
+                money = (
+                    f"<b>{text(yearly_money(year.money.value, costs.currency))}</b>"
+                    f"<small>{text(between)} {text(costs.currency)}</small>"
+                )
             yield (
-                name, text(one.condition.text),
+                name, text(one.condition.text), money, less,
                 _with_interval(kilowatt_hours(one.mean()), one.interval),
-                kilowatt_hours(one.spread()), less, kilowatt_hours(one.mean("moving_j")),
+                kilowatt_hours(one.mean("moving_j")),
                 seconds(one.mean("duration_s")), millimetres(one.mean("clearance_m")),
+                kilowatt_hours(one.spread()),
             )  # fmt: skip
 
 
-def _with_interval(value: str, within: JouleInterval) -> str:
+def _with_interval(value: str, within: JouleInterval | Amount) -> str:
     """A value with its interval on a line of its own."""
-    return f"{value}<br><small>{span_of(within.low, within.high, kilowatt_hours)}</small>"
+    return f"{value}<small>{span_of(within.low, within.high, kilowatt_hours)}</small>"
 
 
 def _maps(
