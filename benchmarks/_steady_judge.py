@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise, permutations, product
+from itertools import pairwise, product
 
 import numpy as np
 from scipy.optimize import linprog
@@ -55,20 +55,63 @@ def one_hop(problem: SteadyProblem) -> SteadyProblem:
     return replace(problem, hops=hops)
 
 
-def orders(activities: int) -> Iterator[tuple[int, ...]]:
-    """All cyclic orders, activity 0 first."""
-    for rest in permutations(range(1, activities)):
-        yield (0, *rest)
+def orders(activities: int, units: int = 1) -> Iterator[tuple[int, ...]]:
+    """All cyclic orders in which every activity comes `units` times, activity 0 first."""
+    left = {a: units - (a == 0) for a in range(activities)}
+
+    def longer(order: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
+        if len(order) == units * activities:
+            yield order
+        for a in left:
+            if left[a] > 0:
+                left[a] -= 1
+                yield from longer((*order, a))
+                left[a] += 1
+
+    yield from longer((0,))
 
 
-def least_by_orders(problem: SteadyProblem, period: float) -> float:
-    """Least joules of a cycle of one unit: every order, every choice of a mode at every wait."""
+def least_by_orders(problem: SteadyProblem, period: float, units: int = 1) -> float:
+    """Least joules of a cycle of so many units: every order, every number of parts that machines
+    may have when it begins, every choice of a mode at every wait.
+    """
     best = np.inf
-    modes = [(*modes, NONE) for modes in problem.before]
-    for order in orders(len(problem.activities)):
-        for chosen in product(*(modes[a] for a in order)):
-            best = min(best, _least_of_order(problem, period, order, chosen))
+    modes = [each if each == MODES[:1] else (*each, NONE) for each in problem.before]
+    for order in orders(len(problem.activities), units):
+        for full in product(*(range(places + 1) for places in problem.places)):
+            pairs = list(stays(order, full, problem.places))
+            if not pairs:
+                continue
+            for chosen in product(*(modes[a] for a in order)):
+                found = _least_of_order(problem, period * units, order, chosen, pairs)
+                best = min(best, found)
     return best
+
+
+Stay = tuple[int, int, int, int]
+"""A part in a machine: which machine, where in the order it comes and where it leaves, and after
+how many whole cycles.
+"""
+
+
+def stays(order: tuple[int, ...], full: tuple[int, ...], places: tuple[int, ...]) -> Iterator[Stay]:
+    """The parts in the machines, first in, first out, of a cycle that goes on and on; none where a
+    machine would have too many or none to take.
+    """
+    inside = list(full)
+    for a in order:
+        if a > 0:
+            inside[a - 1] -= 1
+        if a < len(full):
+            inside[a] += 1
+        if any(not 0 <= parts <= most for parts, most in zip(inside, places, strict=True)):
+            return
+    for machine, parts in enumerate(full):
+        loads = [k for k, a in enumerate(order) if a == machine]
+        unloads = [k for k, a in enumerate(order) if a == machine + 1]
+        for number, load in enumerate(loads):
+            leaves = number + parts
+            yield machine, load, unloads[leaves % len(loads)], leaves // len(loads)
 
 
 def _least_of_order(
@@ -76,15 +119,18 @@ def _least_of_order(
     period: float,
     order: tuple[int, ...],
     chosen: tuple[WaitMode, ...],
+    pairs: list[Stay],
 ) -> float:
     """Least joules of one order, with these modes before its activities. Unknown: for each place in
-    the order the seconds and joules of activity and hop, and the wait before the activity.
+    the order the seconds and joules of activity and hop, and the wait before the activity; for each
+    part in a machine when its process begins.
     """
     n = len(order)
-    cost = np.zeros(5 * n)
+    size = 5 * n + len(pairs)
+    cost = np.zeros(size)
     rows: list[np.ndarray] = []
     right: list[float] = []
-    bounds = []
+    bounds: list[tuple[float | None, float | None]] = []
     for k, a in enumerate(order):
         hop = problem.hops.get((a, order[(k + 1) % n]))
         for base, curve in ((5 * k, problem.activities[a]), (5 * k + 2, hop)):
@@ -96,7 +142,7 @@ def _least_of_order(
             corners = list(zip(curve.seconds, curve.joules, strict=True))
             for (s0, j0), (s1, j1) in pairwise(corners):
                 slope = (j1 - j0) / (s1 - s0)
-                row = np.zeros(5 * n)
+                row = np.zeros(size)
                 row[base] = slope
                 row[base + 1] = -1.0
                 rows.append(row)
@@ -105,29 +151,54 @@ def _least_of_order(
                 bounds[-1] = (corners[0][1], None)
         cost[5 * k + 4] = chosen[k].watts
         bounds.append((chosen[k].shortest, chosen[k].longest))
-    whole = np.ones(5 * n)
-    whole[1::5] = 0.0
-    whole[3::5] = 0.0
-    rows.append(whole)
+    bounds += [(None, None)] * len(pairs)
+    rows.append(_whole(n, size))
     right.append(period)
-    place = {a: k for k, a in enumerate(order)}
-    for machine, process in enumerate(problem.process):
-        # from the end of the activity that loads to the begin of the one that unloads
-        row = np.zeros(5 * n)
-        k = place[machine]
-        row[5 * k + 2] = -1.0
-        while True:
-            k = (k + 1) % n
-            row[5 * k + 4] -= 1.0
-            if order[k] == machine + 1:
-                break
-            row[5 * k] -= 1.0
-            row[5 * k + 2] -= 1.0
+    for row, most in _machine_rows(problem, order, pairs):
         rows.append(row)
-        right.append(-process)
+        right.append(most)
     fixed = sum(mode.joules for mode in chosen)
     answer = linprog(cost, A_ub=np.array(rows), b_ub=right, bounds=bounds, method="highs")
     return float(answer.fun) + fixed if answer.status == 0 else np.inf
+
+
+def _whole(n: int, size: int) -> np.ndarray:
+    """The row of the cycle's length."""
+    whole = np.zeros(size)
+    for column in (0, 2, 4):
+        whole[column : 5 * n : 5] = 1.0
+    return whole
+
+
+def _machine_rows(
+    problem: SteadyProblem, order: tuple[int, ...], pairs: list[Stay]
+) -> Iterator[tuple[np.ndarray, float]]:
+    """Rows at most so much: a process begins when its part is there and one of those that the
+    machine works on at once is finished, and its part is taken after it.
+    """
+    n = len(order)
+    size = 5 * n + len(pairs)
+    whole = _whole(n, size)
+    begins = [np.zeros(size)]  # of the activities, after the one at place 0 has begun
+    for k in range(n - 1):
+        begins.append(begins[-1].copy())
+        begins[-1][[5 * k, 5 * k + 2, 5 * k + 9]] = 1.0
+    own: dict[int, list[int]] = {}
+    for index, (machine, load, unload, cycles) in enumerate(pairs):
+        begun = np.zeros(size)
+        begun[5 * n + index] = 1.0
+        end = begins[load].copy()
+        end[5 * load] = 1.0
+        yield end - begun, 0.0
+        yield begun - begins[unload] - cycles * whole, -problem.process[machine]
+        own.setdefault(machine, []).append(5 * n + index)
+    for machine, columns in own.items():
+        for number, column in enumerate(columns):
+            earlier = number - problem.capacity[machine]
+            row = np.zeros(size)
+            row[columns[earlier % len(columns)]] += 1.0
+            row[column] -= 1.0
+            yield row + (earlier // len(columns)) * whole, -problem.process[machine]
 
 
 def least_on_grid(problem: SteadyProblem, period: float, points: int, step: float) -> float:

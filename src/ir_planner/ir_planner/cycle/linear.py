@@ -94,10 +94,12 @@ class LinearProgram:
         start: FloatArray | None = None,
         stopped: Callable[[], bool] | None = None,
         gap: float = 1e-7,
+        limit: float = np.inf,
     ) -> LinearAnswer:
         """The least cost. fixed: values by variable; loose: whole variables that needn't be whole;
         start: a point to begin with, its whole variables count; stopped: asked in
-        between, the search ends where it says so; gap: relative, at which the search may end.
+        between, the search ends where it says so; gap: relative, at which the search may end;
+        limit: only what costs less is looked for.
         """
         solver = self._empty()
         self._bounds(solver, fixed or {})
@@ -107,6 +109,7 @@ class LinearProgram:
         kinds[list(loose)] = 0
         solver.changeColsIntegrality(count, np.arange(count, dtype=np.int32), kinds)
         solver.setOptionValue("mip_rel_gap", gap)
+        solver.setOptionValue("objective_bound", limit)
         if stopped is not None:
             _interrupt(solver, stopped)
         if start is not None:

@@ -1,20 +1,24 @@
 """The steady cycle of least energy of one robot that tends machines.
 
-Parts go through machines 1 to m in order, each of which works on one part at a time. Activity a
-takes a part at place a (0: infeed) and brings it to place a + 1 (m + 1: outfeed). In a cycle of k
-units every activity is done k times. Chosen together: the order of the activities, the duration of
-each and of the empty hops between them on convex curves of energy over duration, the waits, and
-the power mode of each. The process of a machine may go on over the end of the cycle.
+Parts go through machines 1 to m in order, each of which works on as many at once as its capacity
+is and holds as many more as its buffer. Activity a takes a part at place a (0: infeed) and brings
+it to place a + 1 (m + 1: outfeed). In a cycle of k units every activity is done k times. Chosen
+together: the order of the activities, the duration of each and of the empty hops between them on
+convex curves of energy over duration, the waits, and the power mode of each. The process of a
+machine may go on over the end of the cycle.
 
-The model is a mixed-integer linear program: successors are 0 or 1, times flow along the successors
-that are chosen (a time is zero where its hop isn't), a power mode is a range of a wait's length.
+There is a mixed-integer linear program for each way in which machines can be full when the cycle
+begins: then parts and their places are known, and what comes before what mostly is. Successors are
+0 or 1, times flow along the successors that are chosen (a time is zero where its hop isn't), a
+power mode is a range of a wait's length. A program whose relaxed cost is above a known cycle needs
+no search.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import combinations, pairwise
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise, permutations, product
 
 import numpy as np
 
@@ -25,8 +29,11 @@ UNITS_MAX = 2
 """Most units of a cycle."""
 
 Node = tuple[int, int]
-"""An activity and which of its units, from 0."""
+"""An activity, and its number among its like in the cycle, from 0."""
 Arc = tuple[Node, Node]
+
+_EXACT = 1e-6  # relative, of the cost
+_SAME = 1e-9  # s
 
 
 @dataclass(frozen=True)
@@ -112,11 +119,12 @@ class WaitMode:
 @dataclass(frozen=True)
 class SteadyProblem:
     """activities (m + 1): their curves. hops: of the empty hops by the activities that they are
-    between; where one is missing, the next activity begins where the other ended. after, before:
+    between; where one is missing, the next activity begins where the other ended, and no activity
+    is done twice in a row. after, before:
     modes of a wait at the end of each activity and at the begin of each. process (m): seconds of
     the machines; the one of machine a + 1 lies between the activities a and a + 1. own, own_hops:
     curves of an activity of one unit, and of the hops after it by the activity that follows, where
-    they aren't those of all units.
+    they aren't those of all units. capacities, buffers (m): 1 and 0 of each where they are empty.
     """
 
     activities: tuple[Curve, ...]
@@ -126,6 +134,24 @@ class SteadyProblem:
     process: tuple[float, ...]
     own: Mapping[Node, Curve] = field(default_factory=dict)
     own_hops: Mapping[tuple[Node, int], Curve] = field(default_factory=dict)
+    capacities: tuple[int, ...] = ()
+    buffers: tuple[int, ...] = ()
+
+    @property
+    def alike(self) -> bool:
+        """Whether all units have the same curves."""
+        return not self.own and not self.own_hops
+
+    @property
+    def capacity(self) -> tuple[int, ...]:
+        """Parts that each machine works on at once."""
+        return self.capacities or (1,) * len(self.process)
+
+    @property
+    def places(self) -> tuple[int, ...]:
+        """Parts that each machine holds."""
+        buffers = self.buffers or (0,) * len(self.process)
+        return tuple(map(sum, zip(self.capacity, buffers, strict=True)))
 
     def activity(self, node: Node) -> Curve:
         """The curve of an activity of a unit."""
@@ -193,6 +219,27 @@ class SteadyCycle:
         """The activities in order."""
         return tuple((visit.activity, visit.unit) for visit in self.visits)
 
+    def repeated(self, units: int) -> SteadyCycle:
+        """The cycle of one unit, made so many times."""
+        visits = tuple(
+            replace(visit, unit=unit, start=visit.start + unit * self.period)
+            for unit in range(units)
+            for visit in self.visits
+        )
+        return SteadyCycle(
+            visits, units * self.period, units, units * self.joules, units * self.bound
+        )
+
+
+@dataclass(frozen=True)
+class _Lag:
+    """From the end of `start` to the begin of `end`, so many periods later, at least `seconds`."""
+
+    start: Node
+    end: Node
+    seconds: float
+    periods: int
+
 
 def cheapest_cycle(
     problem: SteadyProblem,
@@ -204,20 +251,72 @@ def cheapest_cycle(
     """The cycle of `units` parts of least energy that takes at most period x units s; None where
     there is none, or none was found before it was `stopped`.
     """
-    return _Model(problem, units, period * units, fastest=False).solve(stopped)
+    once = None
+    if units > 1 and problem.alike:
+        once = cheapest_cycle(problem, period=period, stopped=stopped)
+    return _least(problem, units, period * units, once, stopped)
 
 
 def fastest_cycle(
     problem: SteadyProblem, *, units: int = 1, stopped: Callable[[], bool] | None = None
 ) -> SteadyCycle | None:
     """The shortest cycle; its joules and its bound are seconds."""
-    return _Model(problem, units, problem.longest * units, fastest=True).solve(stopped)
+    once = None
+    if units > 1 and problem.alike:
+        once = fastest_cycle(problem, stopped=stopped)
+    most = problem.longest * units if once is None else once.period * units
+    return _least(problem, units, most, once, stopped, fastest=True)
+
+
+def _least(
+    problem: SteadyProblem,
+    units: int,
+    period: float,
+    once: SteadyCycle | None,
+    stopped: Callable[[], bool] | None,
+    *,
+    fastest: bool = False,
+) -> SteadyCycle | None:
+    """The best cycle over all numbers of parts that machines have when it begins, those of the
+    least bound first. once: a cycle of one unit, which may be made again and again.
+    """
+    best = None if once is None else once.repeated(units)
+    models = []
+    for full in product(*(range(places + 1) for places in problem.places)):
+        model = _Model(problem, units, period, full, fastest=fastest)
+        if model.possible:
+            relaxed = model.program.relaxed()
+            models.append((relaxed.bound, full, model))
+    bound = np.inf
+    for relaxed, _, model in sorted(models, key=lambda each: each[:2]):
+        limit = np.inf if best is None else best.joules * (1.0 - _EXACT)
+        if relaxed >= limit or (stopped is not None and stopped()):
+            bound = min(bound, relaxed)
+            continue
+        cycle, proved = model.solve(stopped, limit)
+        bound = min(bound, max(proved, relaxed))
+        best = cycle or best
+    return None if best is None else replace(best, bound=min(bound, best.joules))
 
 
 class _Model:
-    """The linear program of a problem within a period [s] of the whole cycle."""
+    """The linear program of a problem within a period [s] of the whole cycle, where so many parts
+    are in each machine when it begins (`full`).
 
-    def __init__(self, problem: SteadyProblem, units: int, period: float, *, fastest: bool) -> None:
+    The units of an activity are numbered as they come in the cycle, and parts leave a machine as
+    they came. So the part of load i leaves by unload i + full, and i may begin when the unload
+    i + full - places is over: times differ by at least so much, and by whole periods.
+    """
+
+    def __init__(
+        self,
+        problem: SteadyProblem,
+        units: int,
+        period: float,
+        full: Sequence[int],
+        *,
+        fastest: bool,
+    ) -> None:
         self.problem = problem
         self.units = units
         self.most = period
@@ -227,9 +326,20 @@ class _Model:
         self.nodes: list[Node] = [(a, u) for a in range(count) for u in range(units)]
         self.first = self.nodes[0]
         self._travel = _shortest_travel(problem)
-        self.least = min(self._least_period(), period)
-        self.period = self.program.variable(self.least, period, cost=float(fastest))
-        self.start = {node: self._time(node) for node in self.nodes}
+        self.least = self._least_period()
+        self.lags = [lag for m, parts in enumerate(full) for lag in self._machine_lags(m, parts)]
+        self.lags += [self._lag((a, u), a, u + 1, self._travel[a, a]) for a, u in self.nodes]
+        self.possible = self.least <= self.most and self._windows()
+        if self.possible:
+            self._build(full, fastest=fastest)
+
+    def _build(self, full: Sequence[int], *, fastest: bool) -> None:
+        problem = self.problem
+        self.period = self.program.variable(self.least, self.most, cost=float(fastest))
+        self.start = {
+            node: self.program.variable(self.soonest[node], self.latest[node])
+            for node in self.nodes
+        }
         self.duration: dict[Node, dict[int, float]] = {}
         for node in self.nodes:
             curve = problem.activity(node)
@@ -243,37 +353,105 @@ class _Model:
         self.hop: dict[Arc, dict[int, float]] = {}
         self._successors()
         self._times()
-        self._first_unit()
-        for machine in range(len(problem.process)):
-            self._machine(machine)
+        self._half()
+        for lag in self.lags:
+            self._apart(lag)
+        for machine, parts in enumerate(full):
+            self._queue(machine, parts)
+            self._at_once(machine, parts)
 
     def _least_period(self) -> float:
-        """What the busiest machine takes for its parts, from one load to the next."""
+        """What the busiest machine takes for its parts; one with a single place from one load to
+        the next.
+        """
         busiest = 0.0
         for machine, process in enumerate(self.problem.process):
-            shortest = [
-                min(self.problem.activity((a, unit)).seconds[0] for unit in range(self.units))
-                for a in (machine, machine + 1)
-            ]
-            own = process + sum(shortest) + self._travel[machine + 1, machine]
+            own = process / self.problem.capacity[machine]
+            if self.problem.places[machine] == 1:
+                own += sum(self._shortest(a) for a in (machine, machine + 1))
+                own += self._travel[machine + 1, machine]
             busiest = max(busiest, own)
         return self.units * busiest
 
-    def _time(self, node: Node) -> int:
-        """When an activity starts, no sooner than the robot can be there and back in time."""
-        if node == self.first:
-            return self.program.variable(0.0, 0.0)
-        soonest = self._soonest(node)
-        return self.program.variable(soonest, max(self._latest(node), soonest))
+    def _shortest(self, activity: int) -> float:
+        return min(self.problem.activity((activity, u)).seconds[0] for u in range(self.units))
 
-    def _soonest(self, node: Node) -> float:
-        first = self.problem.activity(self.first).seconds[0]
-        return first + self._travel[self.first[0], node[0]]
+    def _machine_lags(self, machine: int, parts: int) -> Iterator[_Lag]:
+        """A part is taken when its process is over, and one is brought where there is a place."""
+        travel = self._travel[machine + 1, machine]
+        for unit in range(self.units):
+            load = machine, unit
+            yield self._lag(load, machine + 1, unit + parts, self.problem.process[machine])
+            gone = unit + parts - self.problem.places[machine]
+            unload = machine + 1, gone % self.units
+            yield _Lag(unload, load, travel, -(gone // self.units))
 
-    def _latest(self, node: Node) -> float:
-        """Within the longest period; below 0 where that is too short."""
-        back = self._travel[node[0], self.first[0]]
-        return self.most - self.problem.activity(node).seconds[0] - back
+    def _lag(self, node: Node, activity: int, number: int, seconds: float) -> _Lag:
+        """From the end of an activity to the begin of another one, that of this number from the
+        begin of the cycle on.
+        """
+        return _Lag(node, (activity, number % self.units), seconds, number // self.units)
+
+    def _windows(self) -> bool:
+        """The soonest and the latest begin of every activity, and what comes before what; whether
+        there may be a cycle.
+        """
+        moving = {node: self.problem.activity(node).seconds[0] for node in self.nodes}
+        self.soonest = {}
+        self.latest = {}
+        for node in self.nodes:
+            on_the_way = moving[self.first] + self._travel[self.first[0], node[0]]
+            self.soonest[node] = 0.0 if node == self.first else on_the_way
+            back = self._travel[node[0], self.first[0]]
+            self.latest[node] = 0.0 if node == self.first else self.most - moving[node] - back
+        self.order = {(lag.start, lag.end) for lag in self.lags if lag.periods == 0}
+        self.order |= {(self.first, node) for node in self.nodes[1:]}
+        changed = True
+        while changed:
+            changed = False
+            for one, other in permutations(self.nodes, 2):
+                lead = moving[one] + self._travel[one[0], other[0]]
+                if self.soonest[one] + lead > self.latest[other] + _SAME:
+                    changed |= self._ordered(other, one)
+                if (one, other) in self.order:
+                    changed |= self._apart_by(one, other, lead, 0)
+            for lag in self.lags:
+                lead = moving[lag.start] + lag.seconds
+                changed |= self._apart_by(lag.start, lag.end, lead, lag.periods)
+            if any(self.soonest[node] > self.latest[node] + _SAME for node in self.nodes):
+                return False
+            if any((other, one) in self.order for one, other in self.order):
+                return False
+        return True
+
+    def _ordered(self, one: Node, other: Node) -> bool:
+        """One comes before the other; whether that is new."""
+        before = [one, *(a for a, b in self.order if b == one)]
+        after = [other, *(b for a, b in self.order if a == other)]
+        known = len(self.order)
+        self.order |= {(a, b) for a in before for b in after}
+        return len(self.order) > known
+
+    def _apart_by(self, one: Node, other: Node, seconds: float, periods: int) -> bool:
+        """The begins differ by at least so much; whether that makes a window smaller."""
+        soonest = self.soonest[one] + seconds - periods * self.most
+        latest = self.latest[other] + periods * self.most - seconds
+        new = soonest > self.soonest[other] + _SAME or latest < self.latest[one] - _SAME
+        self.soonest[other] = max(soonest, self.soonest[other])
+        self.latest[one] = min(latest, self.latest[one])
+        return new
+
+    def _follows(self, one: Node, other: Node) -> bool:
+        """Whether one activity may be next after another: nothing has to come between."""
+        if one[0] == other[0] and (one[0], other[0]) not in self.problem.hops:
+            return False
+        if other == self.first:
+            return not any((one, node) in self.order for node in self.nodes)
+        if (other, one) in self.order:
+            return False
+        return not any(
+            (one, node) in self.order and (node, other) in self.order for node in self.nodes
+        )
 
     def _cost(self, joules: float) -> int:
         """A variable that is 1: what is spent anyway."""
@@ -306,46 +484,29 @@ class _Model:
         return found
 
     def _successors(self) -> None:
-        """Every activity is followed by one other. The same one twice is none: its machine is
-        full, or empty, in between.
-        """
+        """Every activity is followed by one other."""
         program = self.program
-        for node in self.nodes:
-            for other in self.nodes:
-                if node[0] == other[0]:
-                    continue
-                curve = self.problem.hop(node, other[0])
-                arc = node, other
-                joules = 0.0 if curve is None else curve.joules[0]
-                self.taken[arc] = program.binary(cost=self.price * joules)
-                self.flow[arc] = program.variable(0.0, self.most)
-                most = self.most if other == self.first else self._latest(other)
-                program.row({self.flow[arc]: 1.0, self.taken[arc]: -most}, high=0.0)
-                least = self.problem.activity(node).seconds[0]
-                least += 0.0 if curve is None else curve.seconds[0]
-                least += 0.0 if node == self.first else self._soonest(node)
-                program.row({self.flow[arc]: 1.0, self.taken[arc]: -least}, low=0.0)
-                self.hop[arc] = (
-                    {} if curve is None else self._segments(curve, self.taken[arc], self.taken[arc])
-                )
+        for node, other in permutations(self.nodes, 2):
+            if not self._follows(node, other):
+                continue
+            curve = self.problem.hop(node, other[0])
+            arc = node, other
+            joules = 0.0 if curve is None else curve.joules[0]
+            self.taken[arc] = program.binary(cost=self.price * joules)
+            self.flow[arc] = program.variable(0.0, self.most)
+            most = self.most if other == self.first else self.latest[other]
+            program.row({self.flow[arc]: 1.0, self.taken[arc]: -most}, high=0.0)
+            least = self.problem.activity(node).seconds[0] + self.soonest[node]
+            least += 0.0 if curve is None else curve.seconds[0]
+            program.row({self.flow[arc]: 1.0, self.taken[arc]: -least}, low=0.0)
+            self.hop[arc] = (
+                {} if curve is None else self._segments(curve, self.taken[arc], self.taken[arc])
+            )
         for node in self.nodes:
             out = {x: 1.0 for (a, _), x in self.taken.items() if a == node}
             into = {x: 1.0 for (_, b), x in self.taken.items() if b == node}
             program.row(out, low=1.0, high=1.0)
             program.row(into, low=1.0, high=1.0)
-        self._one_tour()
-
-    def _one_tour(self) -> None:
-        """No activities are a tour of their own, in all their units."""
-        count = len(self.problem.activities)
-        for size in range(2, count):
-            for own in combinations(range(count), size):
-                inside = {
-                    taken: 1.0
-                    for (one, other), taken in self.taken.items()
-                    if one[0] in own and other[0] in own
-                }
-                self.program.row(inside, high=float(size * self.units - 1))
 
     def _times(self) -> None:
         """What flows out of an activity is when the next one is reached."""
@@ -363,49 +524,60 @@ class _Model:
             reached |= {seconds: 1.0 for _, _, seconds in self.waits["before", node]}
             self.program.row({**reached, begin: -1.0}, low=0.0, high=0.0)
 
-    def _machine(self, machine: int) -> None:
-        """A part is taken when its process is over, and the next one is brought after that."""
-        process = self.problem.process[machine]
-        loads = [(machine, unit) for unit in range(self.units)]
-        over = {unit: self._shift() for unit in range(self.units)}
-        turn = self._shift() if self.units > 1 else self.period
-        for load in loads:
-            unit = load[1]
-            unload = (machine + 1, unit)
-            ready = {self.start[unload]: 1.0, over[unit]: 1.0, self.start[load]: -1.0}
-            for variable, factor in self.duration[load].items():
-                ready[variable] = ready.get(variable, 0.0) - factor
-            self.program.row(ready, low=process)
-            following = loads[(unit + 1) % self.units]
-            free = {self.start[following]: 1.0, self.start[unload]: -1.0, over[unit]: -1.0}
-            for variable, factor in self.duration[unload].items():
-                free[variable] = free.get(variable, 0.0) - factor
-            free[turn] = free.get(turn, 0.0) + (1.0 if unit == self.units - 1 else -1.0)
-            if unit < self.units - 1:
-                free[self.period] = 1.0
-            self.program.row(free, low=self._travel[machine + 1, machine])
+    def _apart(self, lag: _Lag) -> None:
+        """The row of a lag."""
+        terms = self._end(lag.start, -1.0)
+        terms[self.start[lag.end]] = terms.get(self.start[lag.end], 0.0) + 1.0
+        self.program.row({**terms, self.period: float(lag.periods)}, low=lag.seconds)
 
-    def _first_unit(self) -> None:
+    def _end(self, node: Node, factor: float) -> dict[int, float]:
+        """Terms of the end of an activity, times a factor."""
+        terms = {self.start[node]: 1.0, **self.duration[node]}
+        return {variable: factor * value for variable, value in terms.items()}
+
+    def _queue(self, machine: int, parts: int) -> None:
+        """Where parts wait in a machine for others: when it begins with each of them."""
+        if self.problem.places[machine] == self.problem.capacity[machine]:
+            return
+        process = self.problem.process[machine]
+        begun = [self.program.variable(0.0) for _ in range(self.units)]
+        for unit, begin in enumerate(begun):
+            terms = self._end((machine, unit), -1.0)
+            self.program.row({**terms, begin: 1.0}, low=0.0)
+            before = unit - self.problem.capacity[machine]
+            if before % self.units != unit:
+                terms = {begin: 1.0, begun[before % self.units]: -1.0}
+                self.program.row({**terms, self.period: -(before // self.units)}, low=process)
+            gone = unit + parts
+            unload = self.start[machine + 1, gone % self.units]
+            terms = {unload: 1.0, begin: -1.0, self.period: gone // self.units}
+            self.program.row(terms, low=process)
+
+    def _at_once(self, machine: int, parts: int) -> None:
+        """Who takes a part right after he brought it waits for the whole process: what the times
+        say too, but only where successors are whole.
+        """
+        for unit in range(self.units):
+            load = machine, unit
+            unload = machine + 1, unit + parts
+            if (load, unload) in self.taken:
+                waits = [*self.waits["after", load], *self.waits["before", unload]]
+                terms = {seconds: 1.0 for _, _, seconds in waits}
+                terms[self.taken[load, unload]] = -self.problem.process[machine]
+                self.program.row(terms, low=0.0)
+
+    def _half(self) -> None:
         """Where the units are alike, the second one begins in the first half of the period."""
-        alike = not self.problem.own and not self.problem.own_hops
-        if self.units > 1 and alike:
+        if self.units > 1 and self.problem.alike:
             self.program.row({self.start[0, 1]: 1.0, self.period: -0.5}, high=0.0)
 
-    def _shift(self) -> int:
-        """A time that is 0 or the period."""
-        whole = self.program.binary()
-        shift = self.program.variable(0.0, self.most)
-        self.program.row({shift: 1.0, self.period: -1.0}, high=0.0)
-        self.program.row({shift: 1.0, whole: -self.most}, high=0.0)
-        self.program.row({shift: 1.0, self.period: -1.0, whole: -self.most}, low=-self.most)
-        self.program.row({shift: 1.0, whole: -self.least}, low=0.0)
-        self.program.row({shift: 1.0, self.period: -1.0, whole: -self.least}, high=-self.least)
-        return shift
-
-    def solve(self, stopped: Callable[[], bool] | None) -> SteadyCycle | None:
-        answer = self.program.solve(stopped=stopped, gap=1e-6)
-        if answer.values is None:
-            return None
+    def solve(
+        self, stopped: Callable[[], bool] | None, limit: float
+    ) -> tuple[SteadyCycle | None, float]:
+        """A cycle below the limit, and what none can be below."""
+        answer = self.program.solve(stopped=stopped, gap=1e-6, limit=limit)
+        if answer.values is None or answer.cost >= limit:
+            return None, answer.bound
         values = answer.values
         following = {a: b for (a, b), taken in self.taken.items() if values[taken] > 0.5}
         visits: list[Visit] = []
@@ -423,9 +595,9 @@ class _Model:
                 )
             )
             node = following[node]
-        return SteadyCycle(
-            tuple(visits), float(values[self.period]), self.units, answer.cost, answer.bound
-        )
+        period = float(values[self.period])
+        cycle = SteadyCycle(tuple(visits), period, self.units, answer.cost, answer.bound)
+        return cycle, answer.bound
 
     def _waited(self, where: str, node: Node, values: FloatArray) -> tuple[ModeWait, ...]:
         return tuple(

@@ -293,19 +293,19 @@ class CycleSteps:
         visits = self._cycle.visits
         cell = self._tending.cell
         process = [cell.machine(name).process for name in machines_of(cell)]
-        order = [(visit.activity, visit.unit) for visit in visits]
+        order = [visit.activity for visit in visits]
         count = len(order)
         waits = np.zeros(count)
         for _ in range(4 * count):
-            for k, (activity, unit) in enumerate(order):
+            for k, activity in enumerate(order):
                 if activity == 0:
                     continue
-                i = order.index((activity - 1, unit))
-                since = lengths[i][1]
-                i = (i + 1) % count
-                while i != k:
+                since = 0.0
+                i = (k - 1) % count
+                while order[i] != activity - 1:
                     since += waits[i] + sum(lengths[i])
-                    i = (i + 1) % count
+                    i = (i - 1) % count
+                since += lengths[i][1]
                 waits[k] = max(process[activity] - since, 0.0)
         period = float(waits.sum()) + sum(map(sum, lengths))
         waits[0] += max(self._cycle.period - period, 0.0)
