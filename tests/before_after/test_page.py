@@ -78,8 +78,9 @@ def test_the_headline_has_money_energy_and_co2_of_shifts_and_nights(
     )
     night = power["STAND_ON_BRAKES"] - power["HIBERNATION"]
     joules = year + night * costs.idle_hours * 3600.0
-    shown = (kilowatt_hours(joules), f"{kilograms(costs.co2(joules))} CO2 less a year")
-    assert f"<h2>{money(joules / J_PER_KWH * 0.27, 'EUR')}, {', '.join(shown)}</h2>" in page
+    answer = page.split('<section id="answer">')[1].partition("</section>")[0]
+    assert f"<b>{money(joules / J_PER_KWH * 0.27, 'EUR')} less a year</b>" in answer
+    assert f"{kilowatt_hours(joules)}, {kilograms(costs.co2(joules))} CO2 less" in answer
     assert "from the data sheet, not measured" in page
     assert "1. at night and at weekends" in page
     assert "2. " in page.split("1. at night and at weekends")[1]

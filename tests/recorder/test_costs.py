@@ -343,14 +343,13 @@ def test_hibernation_outside_of_the_shifts_is_a_headline(analysis: Analysis) -> 
     year = costs.saving_of_year(cycle)
     assert year is not None
     both = yearly_money(costs.money(year.value) + found.saved, "EUR")
-    assert f"<span>saved a year, both together</span><b>{both}</b>" in rows[0]
     energy = year.value + found.energy.value
     assert found.energy.value == pytest.approx(power * costs.idle_hours * 3600.0)
     headline = f"{both}, {kilowatt_hours(energy)}, {kilograms(costs.co2(energy))} CO2 less a year"
-    assert f"<h2>{headline}</h2>" in report_html(analysis, (), costs=costs)
-    answer = fleet_html([member], costs=costs).split('<section id="answer">')[1]
-    assert f"<b>{both} less a year</b>" in answer
-    assert f"{headline.partition(', ')[2].removesuffix(' a year')}." in answer
+    for page in (report_html(analysis, (), costs=costs), fleet_html([member], costs=costs)):
+        answer = page.split('<section id="answer">')[1]
+        assert f"<b>{both} less a year</b>" in answer
+        assert headline.partition(", ")[2].removesuffix(" a year") in answer
     assert "less energy of the whole line" not in rows[0]
     assert "from the data sheet, not measured" in rows[0]
     assert cycle.savings is not None

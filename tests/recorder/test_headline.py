@@ -68,10 +68,10 @@ def test_a_plan_without_a_drive_says_whether_it_is_proved(analysis: Analysis) ->
     """Once it read "Nothing was checked" beside "proved"."""
     plan = not_driven(analysis)
     assert plan.recording.only_planned
-    for proved, word in ((True, "Plan proved"), (False, "Plan not proved")):
+    for proved, word in ((True, ">Proved"), (False, ">Not proved")):
         own = replace(plan, recording=replace(plan.recording, planned_certified=proved))
         shown = verdict((), own)
-        assert f"{word}; nothing driven to check" in shown
+        assert f"{word}: no collision, within limits" in shown
         assert "good" not in shown
 
 
@@ -99,6 +99,6 @@ def test_a_value_at_the_lower_end_of_its_interval_says_why(low: float, said: boo
 
 def test_a_plan_has_one_row_of_tiles_and_no_part_is_lost(analysis: Analysis) -> None:
     shown = tiles(not_driven(analysis))
-    assert shown.count('class="tile"') <= 5
+    assert shown.count('class="tile"') <= 6
     for part in ("movements", "pauses"):
         assert re.search(rf"<small>{part} [\d.]+ Wh in [\d.]+ s</small>", shown), part

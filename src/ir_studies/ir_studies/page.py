@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from importlib.resources import files
 from typing import Any
 
+from ir_recorder.report.answer import Answer
 from ir_recorder.report.number_text import text
-from ir_recorder.report.shell import Answer, badge, shell
+from ir_recorder.report.shell import badge, shell
 from ir_recorder.report.tables import table
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 
 import numpy as np
 
@@ -243,9 +243,21 @@ def _driven(analysis: Analysis, program: ProgramTotals) -> Production | None:
         cycles,
         _modes(analysis, full, seconds, energy, cycles, _all_of(analysis)),
         _steps(analysis, full, cycles, _all_of(analysis)),
-        _full_savings(analysis.savings, full),
+        _of_a_cycle(_full_savings(analysis.savings, full), cycles / programs),
         tuple(notes),
     )
+
+
+def _of_a_cycle(savings: ProgramSavings | None, count: float) -> ProgramSavings | None:
+    """Savings of a program of so many cycles as those of one."""
+    if savings is None or count == 1.0:
+        return savings
+    movements, pauses = (
+        Saving(*(value / count for value in astuple(part)))
+        for part in (savings.movements, savings.pauses)
+    )
+    ends = {"total_low": savings.total_low / count, "total_high": savings.total_high / count}
+    return replace(savings, movements=movements, pauses=pauses, **ends)
 
 
 def _cycles_of_program(recording: Recording) -> int:

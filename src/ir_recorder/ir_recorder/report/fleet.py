@@ -31,6 +31,7 @@ from ir_recorder.errors import ReadError, RecorderError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import is_further_part
 from ir_recorder.reading.reader import read_recording
+from ir_recorder.report.answer import Answer
 from ir_recorder.report.costs import (
     LEFT_ALONE,
     Costs,
@@ -63,7 +64,7 @@ from ir_recorder.report.number_text import (
 )
 from ir_recorder.report.page import PAGE_START, folded
 from ir_recorder.report.paid import Paid, Tile, row_of
-from ir_recorder.report.shell import Answer, badge, shell
+from ir_recorder.report.shell import badge, shell
 from ir_recorder.report.step_table import TableValue, write_columns
 from ir_recorder.report.tables import COMPACT, bar, table
 from ir_recorder.report.whole_line import WholeLine, line_section, of_whole_line
@@ -416,7 +417,7 @@ def fleet_html(
     ]
     paid = _paid(known, prices)
     first = _answer(paid, robots, prices).html()
-    year = paid.picture(prices, "Energy costs of a year")
+    year = paid.picture(prices)
     shown = [tile for tile in _tiles(paid, known, robots, prices) if tile is not None]
     return shell(
         f"{counted(len(robots), 'robot')}, {counted(len(members), 'recording')}",
@@ -451,23 +452,12 @@ def _answer(paid: Paid, robots: Sequence[Robot], costs: Costs) -> Answer:
     saved = year.with_energy(costs)
     parts = [f"of {counted(len(summed), 'robot')} together", f"{saved} {less}" if saved else ""]
     words = ", ".join(part for part in parts if part)
-    return Answer(result, f"{words}.", _sure_of(paid, costs), _steps(paid, robots, costs))
+    return Answer(result, f"{words}.", paid.sure(costs), _steps(paid, robots, costs))
 
 
 def _sure(price: Amount, costs: Costs) -> str:
     between = yearly_span(price.low, price.high)
     return f"90 % interval {between} {costs.currency}." if price.low < price.high else ""
-
-
-def _sure_of(paid: Paid, costs: Costs) -> str:
-    """How sure a saving is: its interval, and what each part of it rests on."""
-    said = []
-    if paid.saved is not None:
-        _, gain = paid.year(costs).money.gain()
-        said += [_sure(gain, costs), "What plans save is predicted."]
-    if paid.idle is not None:
-        said.append(f"What nights save is {paid.idle.basis}.")
-    return " ".join(each for each in said if each)
 
 
 def _steps(paid: Paid, robots: Sequence[Robot], costs: Costs) -> str:

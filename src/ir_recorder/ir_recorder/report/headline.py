@@ -11,23 +11,27 @@ from ir_recorder.analysis import Analysis, Finding, ProgramTotals, Share, Verdic
 from ir_recorder.analysis.production import (
     DRIVES_ONLY,
     Production,
+    demand_watts,
     driven_and_predicted,
     drives_only,
+    levers,
     planned_clearance,
     planned_interval,
     planned_share,
     production_of,
-    saved_amount,
 )
 from ir_recorder.format.contents import OWN_FACTS, VERSION
 from ir_recorder.reading.recording import Recording
+from ir_recorder.report.answer import Answer
 from ir_recorder.report.costs import (
     NAMES,
     Costs,
     cycles_of_year,
+    demand_money,
+    money_of_thousand,
     recorded_idle_saving,
-    share_between,
     yearly_money,
+    yearly_span,
 )
 from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import (
@@ -46,7 +50,7 @@ from ir_recorder.report.number_text import (
     text,
     watts,
 )
-from ir_recorder.report.paid import Paid, Tile
+from ir_recorder.report.paid import COMMON, Paid, Tile, a_night, first_steps
 
 _STYLES = {Verdict.HOLDS: "good", Verdict.FAILS: "bad", Verdict.NOT_CHECKED: "open"}
 
@@ -104,8 +108,8 @@ def checked(checks: Sequence[Finding], analysis: Analysis | None = None) -> tupl
     """The verdict over all checks in a sentence; of a plan that was not driven, what was proved."""
     made = any(check.verdict is not Verdict.NOT_CHECKED for check in checks)
     if analysis is not None and analysis.recording.only_planned and not made:
-        proved = "proved" if analysis.recording.planned_certified else "not proved"
-        return Verdict.NOT_CHECKED, f"plan {proved}; nothing driven to check"
+        proved = "" if analysis.recording.planned_certified else "not "
+        return Verdict.NOT_CHECKED, f"{proved}proved: no collision, within limits"
     return summary(tuple(checks))
 
 
@@ -151,14 +155,23 @@ def tiles(analysis: Analysis, costs: Costs | None = None) -> str:
     """A year, the cycle and its peak; those of the program where one was executed."""
     program = analysis.program
     prices = costs or Costs()
-    alone = [] if _held_against(analysis) else _paid(analysis, prices).tiles(prices)
-    paid = (*alone, _yearly(analysis, prices), _saved(analysis))
+    cycle = production_of(analysis)
+    paid = [*_paid(analysis, prices).parts(prices)]
+    if cycle is not None:
+        paid += [yearly_tile(cycle, prices), _demand(analysis, cycle, prices)]
     if analysis.recording.only_planned and program is None:
         return _html([*paid, *driven_tiles(analysis)])
     if program is None:
         none = Tile("program", "none executed", ("figures of the whole recording only",))
         return _html([*paid, none, *driven_tiles(analysis)])
     return _html([*paid, _unshortened(program) or _whole(analysis, program), _peak(analysis)])
+
+
+def _demand(analysis: Analysis, cycle: Production, costs: Costs) -> Tile:
+    peak = demand_watts(analysis, cycle)
+    return Tile(
+        "largest quarter of an hour", watts(peak), (demand_money(peak, costs), cycle.supply)
+    )
 
 
 def driven_tiles(analysis: Analysis) -> list[Tile]:
@@ -176,17 +189,48 @@ def _peak(analysis: Analysis) -> Tile:
     return Tile("peak power", watts(analysis.peak_power), ("of a 10 ms reading",))
 
 
-def _held_against(analysis: Analysis) -> bool:
-    """Whether a year of the common program is known, beside which what is saved stands."""
-    cycle = production_of(analysis)
-    return cycle is not None and cycle.savings is not None
-
-
-def paid_row(analysis: Analysis, costs: Costs) -> str:
-    """What those who pay ask first, as on every page; "" without a common program, where it stands
-    among the figures of the run.
+def answer(analysis: Analysis, costs: Costs) -> str:
+    """What those who pay ask first, as on every page, and a year as a picture; "" where no whole
+    cycle is known.
     """
-    return _paid(analysis, costs).html(costs) if _held_against(analysis) else ""
+    cycle = production_of(analysis)
+    if cycle is None:
+        return ""
+    paid = _paid(analysis, costs)
+    if cycle.savings is None:
+        return _without_saving(analysis, cycle, paid, costs).html()
+    total = cycle.savings.total
+    count = costs.cycles_per_year(total.seconds or cycle.seconds)
+    pauses = "pauses in the planned power modes"
+    steps = [
+        (costs.money(saving.saved * count), words)
+        for words, saving in (
+            ("movements as planned", cycle.savings.movements),
+            (pauses, cycle.savings.pauses),
+        )
+    ]
+    each = 1.0 / costs.parts_per_cycle
+    part = (total.common * each, total.planned * each)
+    return paid.answer(costs, steps, part).html() + paid.picture(costs)
+
+
+def _without_saving(analysis: Analysis, cycle: Production, paid: Paid, costs: Costs) -> Answer:
+    """What a year costs, where nobody knows what a plan saves of it."""
+    energy = costs.energy_of_year(cycle)
+    price = energy.of(costs.money)
+    taken = f"{kilowatt_hours(energy.value)}, {kilograms(costs.co2(energy.value))} CO2"
+    count = costs.cycles_per_year(cycle.pace)
+    steps = [(costs.money(lever.joules * count), lever.name) for lever in levers(analysis)]
+    part = money_of_thousand(cycle.energy / costs.parts_per_cycle, costs)
+    between = f"90 % interval {yearly_span(price.low, price.high)} {costs.currency}."
+    origin = f"{cycle.origin[0].upper()}{cycle.origin[1:]}: {cycle.name}."
+    return Answer(
+        f"{yearly_money(price.value, costs.currency)} a year",
+        f"in shifts: {taken}; {cycles_of_year(cycle.pace, costs)}.",
+        " ".join([between if price.low < price.high else "", origin, cycle.supply]).strip(),
+        [f"{each}, at most" for each in first_steps(steps, paid.idle, costs)],
+        [f"Parts: {part}", *a_night(paid.idle, costs)],
+    )
 
 
 def _paid(analysis: Analysis, costs: Costs) -> Paid:
@@ -205,7 +249,7 @@ def _paid(analysis: Analysis, costs: Costs) -> Paid:
     if analysis.program is not None:
         name = f"as driven, {analysis.recording.origin}"
         driven = (name, costs.energy_of_year(cycle).value)
-    return Paid(saved, common, idle, said, "common program", driven, cycle.supply)
+    return Paid(saved, common, idle, said, COMMON, driven, cycle.supply)
 
 
 def run_tiles(analysis: Analysis) -> str:
@@ -320,33 +364,6 @@ def _unshortened(program: ProgramTotals) -> Tile | None:
         kilowatt_hours(full.energy),
         (f"in {seconds(full.seconds)}", cut, "computed from this run and the data"),
     )
-
-
-def _saved(analysis: Analysis) -> Tile | None:
-    """What the common program takes, and what the plan saves of it, pauses at full length."""
-    cycle = production_of(analysis)
-    savings = cycle.savings if cycle is not None else analysis.savings
-    if savings is None:
-        return None
-    total = savings.total
-    word, amount = saved_amount(total).gain()
-    within = share_between(amount, total.common)
-    beside = "of" if word == "saved" else "than"
-    energy = kilowatt_hours(amount.value)
-    before = f"{energy} {beside} the common program's {kilowatt_hours(total.common)}"
-    paced = f"planned in its time, {seconds(total.seconds)}" if total.seconds else ""
-    limit = cycle.supply if cycle is not None else ""
-    name = "saved by its plan" if word == "saved" else "more by its plan"
-    return Tile(
-        name,
-        f"{100.0 * abs(total.share):.1f} %",
-        (f"{before}, predicted", paced, within, amount.doubt, limit),
-    )
-
-
-def _yearly(analysis: Analysis, costs: Costs) -> Tile | None:
-    cycle = production_of(analysis)
-    return None if cycle is None else yearly_tile(cycle, costs)
 
 
 def yearly_tile(cycle: Production, costs: Costs) -> Tile:

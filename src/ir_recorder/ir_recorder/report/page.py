@@ -24,9 +24,9 @@ from ir_recorder.report.costs import (
 from ir_recorder.report.data import page_data
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import (
+    answer,
     failing,
     notes,
-    paid_row,
     run_tiles,
     source,
     subtitle,
@@ -124,7 +124,7 @@ def report_html(
         "verdict": verdict(checks, analysis),
         "failing": failing(checks),
         "notes": notes(analysis),
-        "paid": paid_row(analysis, prices),
+        "paid": answer(analysis, prices),
         "tiles": tiles(analysis, prices),
         "run": run_tiles(analysis),
         "capacity": text(joules(controller.dc_link_capacity_energy)),

@@ -9,11 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ir_recorder.analysis.production import Amount
+from ir_recorder.report.answer import Answer
 from ir_recorder.report.bars import Piece, Row, bars
 from ir_recorder.report.costs import (
     Costs,
     IdleSaving,
     SavedYear,
+    money_of_thousand,
     payback,
     saved_year,
     yearly_money,
@@ -37,6 +39,11 @@ class Tile:
         return f'<div class="tile"><span>{text(self.name)}</span><b>{text(self.value)}</b>{notes}</div>'  # noqa: E501
 
 
+COMMON = "common program"
+"""What plans are held against where nobody gave today's program."""
+_COMMON = " Common program: the same stations by PTP at 100 %, its pauses left to the controller."
+
+
 @dataclass(frozen=True)
 class Paid:
     """What those who pay ask first. saved [J] a year by the plan, of `common` [J]; None where it is
@@ -54,35 +61,47 @@ class Paid:
     supply: str = ""
     robots: int = 1
 
-    def tiles(self, costs: Costs) -> list[Tile]:
-        """The figures that are known."""
-        shown = [self._saved(costs), self._idle(costs), self._both(costs)]
-        return [tile for tile in shown if tile is not None]
+    def answer(
+        self, costs: Costs, steps: Sequence[Step], part: tuple[float, float] | None = None
+    ) -> Answer:
+        """What a page says first; the saving must be known. part [J]: what a part took and takes
+        then.
+        """
+        year = self.year(costs)
+        word, gain = year.money.gain()
+        less = "less" if word == "saved" else "more"
+        today = costs.money(self.common) + (0.0 if self.idle is None else self.idle.left_alone)
+        energy = year.with_energy(costs)
+        share = f"{_percent(gain.value, today)} of {yearly_money(today, costs.currency)}"
+        said = (f"{energy} {less}" if energy else "", share, payback(year.money, costs))
+        result = f"{yearly_money(gain.value, costs.currency)} {less} a year"
+        if self.saved is not None and self.saved.doubt:
+            result = f"Open whether anything is saved: {result}"
+        words = "; ".join(each for each in said if each)
+        return Answer(
+            result,
+            f"{words}.",
+            self.sure(costs),
+            first_steps(steps, self.idle, costs) or "Keep the program as it is.",
+            [*_of_parts(part, costs), *a_night(self.idle, costs)],
+        )
 
-    def html(self, costs: Costs) -> str:
-        """The picture and the row of figures; "" where nothing is known."""
-        shown = self.tiles(costs)
-        return self.picture(costs) + row_of(shown) if shown else ""
+    def sure(self, costs: Costs) -> str:
+        """How sure a saving is: its interval, and what each part of it rests on."""
+        said = []
+        if self.saved is not None:
+            between = _between(self.year(costs).money.gain()[1], costs)
+            said += [f"{between}." if between else "", self.supply, "What plans save is predicted."]
+        if self.idle is not None:
+            said.append(f"What nights save is {self.idle.basis}.")
+        return " ".join(each for each in said if each)
 
     def parts(self, costs: Costs) -> list[Tile]:
         """What is saved in shifts and outside of them, each by itself."""
         return [tile for tile in (self._saved(costs), self._idle(costs)) if tile is not None]
 
-    def _headline(self, costs: Costs) -> str:
-        """What is saved of a year in all, in money and energy."""
-        year = self.year(costs)
-        word, gain = year.money.gain()
-        less = "less" if word == "saved" else "more"
-        parts = (yearly_money(gain.value, costs.currency), year.with_energy(costs))
-        head = f"{', '.join(part for part in parts if part)} {less} a year"
-        if self.saved is not None and self.saved.doubt:
-            return f"It is open whether anything is saved: {head}"
-        return head
-
-    def picture(self, costs: Costs, head: str = "") -> str:
-        """A year before and after, with its message as the head unless there is another; "" where
-        the saving isn't known.
-        """
+    def picture(self, costs: Costs) -> str:
+        """A year before and after; "" where the saving isn't known."""
         if self.saved is None:
             return ""
         nights = (0.0, 0.0) if self.idle is None else (self.idle.left_alone, self.idle.deepest)
@@ -100,9 +119,10 @@ class Paid:
             rows.append(_year_row(name, "driven", (costs.money(energy), nights[1]), costs))
         pale = " Pale: at night and at weekends." if self.idle is not None else ""
         whisker = " Whisker: 90 % interval of what is saved." if sure else ""
-        hint = f"Energy costs of a year. In full colour: in shifts{self.counted}.{pale}{whisker}"
+        common = _COMMON if self.before == COMMON else ""
+        hint = f"In full colour: in shifts{self.counted}.{pale}{whisker}{common}"
         return (
-            f'<section id="year"><h2>{text(head or self._headline(costs))}</h2>'
+            f'<section id="year"><h2>Energy costs of a year</h2>'
             f'{bars(rows, "energy costs of a year")}<p class="hint">{text(hint)}</p></section>'
         )
 
@@ -144,16 +164,46 @@ class Paid:
             ),
         )
 
-    def _both(self, costs: Costs) -> Tile | None:
-        if self.saved is None or self.idle is None:
-            return None
-        year = self.year(costs)
-        word, gain = year.money.gain()
-        price = yearly_money(gain.value, costs.currency)
-        today = costs.money(self.common) + self.idle.left_alone
-        share = f"{_percent(gain.value, today)} {'less' if word == 'saved' else 'more'}"
-        notes = (_between(gain, costs), share, year.with_energy(costs), payback(year.money, costs))
-        return Tile(f"{word} a year, both together", price, notes)
+
+Step = tuple[float, str]
+"""Something to do: money of a year, and words."""
+_FEW = 3  # to do, at the top of a page
+
+
+def first_steps(steps: Sequence[Step], idle: IdleSaving | None, costs: Costs) -> list[str]:
+    """The steps that save most, and rest outside of the shifts among them."""
+    found = [step for step in steps if step[0] >= _WORTH]
+    if idle is not None:
+        found.append((idle.saved, f"{idle.mode} at night and at weekends"))
+    found.sort(key=lambda step: -step[0])
+    return [
+        f"{words[0].upper()}{words[1:]}: {yearly_money(money, costs.currency)} a year"
+        for money, words in found[:_FEW]
+    ]
+
+
+_WORTH = 0.01  # of a currency, a year: less is no step
+
+
+def _of_parts(part: tuple[float, float] | None, costs: Costs) -> list[str]:
+    if part is None:
+        return []
+    before, then = (money_of_thousand(joules, costs) for joules in part)
+    return [f"1 000 parts: {then.partition(' for')[0]} instead of {before.partition(' for')[0]}"]
+
+
+def a_night(idle: IdleSaving | None, costs: Costs) -> list[str]:
+    """What rest between the shifts of two days costs, in words; none where shifts follow each
+    other.
+    """
+    hours = 24.0 - costs.shift_hours * costs.shifts_per_day
+    if idle is None or hours <= 0.0:
+        return []
+    today, then = (
+        yearly_money(hours / idle.hours * each, costs.currency)
+        for each in (idle.left_alone, idle.deepest)
+    )
+    return [f"A night of {hours:g} h: {then} in {idle.mode} instead of {today} on brakes"]
 
 
 def _year_row(
@@ -184,7 +234,7 @@ def _percent(part: float, whole: float) -> str:
     return f"{100.0 * part / whole:.1f} %" if whole > 0.0 else ""
 
 
-def _between(money: Amount, costs: Costs) -> str:
-    if money.high <= money.low:
+def _between(price: Amount, costs: Costs) -> str:
+    if price.high <= price.low:
         return ""
-    return f"90 % interval {yearly_span(money.low, money.high)} {costs.currency}"
+    return f"90 % interval {yearly_span(price.low, price.high)} {costs.currency}"

@@ -108,17 +108,36 @@ _FIT = 0.999  # of the cycles: fewer are said
 
 
 def paid_row(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
-    """What those who pay ask first, of the side that the changes lead to."""
+    """What those who pay ask first, of the side that the changes lead to; a year as a picture."""
+    side = found.planned
+    year = year_of(found, side, costs)
+    paid = _paid(found, cell, costs)
+    steps = [
+        (costs.money(change.saving.saved * year.cycles_a_year), _step(change))
+        for change in found.changes
+    ]
+    each = 1.0 / costs.parts_per_cycle
+    part = (side.saving.common * each, side.report.energy * each)
+    return paid.answer(costs, steps, part).html() + paid.picture(costs)
+
+
+def _step(change: StepChange) -> str:
+    """A change in a sentence, at the top of the page."""
+    return f"{change.name}{_long(change).replace(' pause of', '')}: {change.words}"
+
+
+def _paid(found: BeforeAfter, cell: Cell, costs: Costs) -> Paid:
     side = found.planned
     year = year_of(found, side, costs)
     today = side.saving.common * year.cycles_a_year
-    idle = _idle(found, cell, costs)
     counted = f", {cycles_of_year(year.pace, costs)}"
-    return Paid(year.saved, today, idle, counted).html(costs)
+    return Paid(year.saved, today, _idle(found, cell, costs), counted)
 
 
-def tiles(found: BeforeAfter, costs: Costs) -> str:
-    """The cycle in figures, of the side that the changes lead to."""
+def tiles(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
+    """The year's saving in its parts and the cycle in figures, of the side that the changes lead
+    to.
+    """
     side = found.planned
     report = side.report
     today = found.today.report
@@ -127,6 +146,7 @@ def tiles(found: BeforeAfter, costs: Costs) -> str:
     quarter = demand_of(side)
     return row_of(
         [
+            *_paid(found, cell, costs).parts(costs),
             Tile(
                 f"{word} a cycle",
                 kilowatt_hours(cycle.value),
@@ -462,7 +482,7 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
         ),
         "problems": _problems(found, cell),
         "paid": paid_row(found, cell, prices),
-        "tiles": tiles(found, prices),
+        "tiles": tiles(found, cell, prices),
         "figures": figure_table(found, prices),
         "assumptions": assumptions(prices),
         "basis": basis_section(found, cell),

@@ -24,6 +24,7 @@ from ir_recorder.analysis.production import (
 from ir_recorder.analysis.results import StepResult
 from ir_recorder.analysis.robots import STAMPS, zone_passes
 from ir_recorder.analysis.tending import Span
+from ir_recorder.report.answer import Answer
 from ir_recorder.report.costs import (
     Costs,
     IdleSaving,
@@ -48,7 +49,7 @@ from ir_recorder.report.number_text import (
 )
 from ir_recorder.report.page import PAGE_START
 from ir_recorder.report.paid import Tile, row_of
-from ir_recorder.report.shell import Answer, shell
+from ir_recorder.report.shell import shell
 from ir_recorder.report.tables import check_table, table
 from ir_values.files import ANYWHERE, FileRoots
 

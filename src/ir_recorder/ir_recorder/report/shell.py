@@ -1,11 +1,8 @@
-"""What pages have in common: their head with title, badges and the button for light and dark, and
-the answer that stands above all figures.
-"""
+"""What pages have in common: their head with title, badges and the button for light and dark."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from ir_recorder.report.number_text import text
 from ir_recorder.report.page import asset
@@ -13,26 +10,6 @@ from ir_recorder.report.page import asset
 _PLAIN = "themes(() => {}, () => {});\nexportButtons();"
 SCRIPTS = ("charts.js", "export.js")
 """Of a page without curves."""
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What a page says first: the result in a few large words and a sentence, how sure it is, and
-    what to do; "" where there is nothing to say.
-    """
-
-    result: str
-    words: str
-    sure: str = ""
-    do: str = ""
-
-    def html(self) -> str:
-        """As the first section of a page."""
-        parts = [f"<div><h2>Result</h2><b>{text(self.result)}</b><p>{text(self.words)}</p></div>"]
-        for head, words in (("How sure", self.sure), ("What to do", self.do)):
-            if words:
-                parts.append(f"<div><h2>{head}</h2><p>{text(words)}</p></div>")
-        return f'<section id="answer">{"".join(parts)}</section>\n'
 
 
 def badge(words: str, kind: str) -> str:

@@ -17,6 +17,7 @@ from ir_msgs_py.options import ROBOTS_TIME_VALUE
 from ir_planner.search import SEARCHES
 from ir_planner.search.with_ompl import needs_ompl
 from ir_recorder.analysis.intervals import LEVEL, Mean
+from ir_recorder.report.answer import Answer
 from ir_recorder.report.files import write_output
 from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import DASH, joules, millimetres, percent, seconds, text
@@ -24,7 +25,6 @@ from ir_recorder.report.page import PAGE_START, asset
 from ir_recorder.report.paid import Tile, row_of
 from ir_recorder.report.series import Curves, Json, packed
 from ir_recorder.report.shapes import body_mesh, capsule_mesh
-from ir_recorder.report.shell import Answer
 from ir_recorder.report.tables import COMPACT, bar, table
 from ir_studies.arena.figures import (
     GRID,

@@ -16,6 +16,7 @@ from scipy.spatial import ConvexHull, QhullError
 from ir_description import Cell, cell_to_yaml
 from ir_planner.checks import JouleInterval
 from ir_recorder.analysis.production import Amount
+from ir_recorder.report.answer import Answer
 from ir_recorder.report.bars import Piece, Row, bars
 from ir_recorder.report.costs import Costs, assumed_section, payback, yearly_money, yearly_span
 from ir_recorder.report.files import write_output
@@ -31,7 +32,6 @@ from ir_recorder.report.number_text import (
 from ir_recorder.report.page import PAGE_START
 from ir_recorder.report.paid import Tile, row_of
 from ir_recorder.report.shapes import body_mesh, capsule_mesh
-from ir_recorder.report.shell import Answer
 from ir_recorder.report.step_table import write_columns
 from ir_recorder.report.tables import table
 from ir_studies.layout.placement import Known, Variable

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from ir_recorder.analysis.intervals import ALIKE, LEVEL, Mean
+from ir_recorder.report.answer import Answer
 from ir_recorder.report.bars import tick_step
 from ir_recorder.report.files import write_output
 from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import DASH, significant, text
 from ir_recorder.report.page import PAGE_START, folded
 from ir_recorder.report.paid import Tile, row_of
-from ir_recorder.report.shell import Answer
 from ir_recorder.report.step_table import write_columns
 from ir_recorder.report.tables import table
 from ir_studies.page import Head, page, settings_table
