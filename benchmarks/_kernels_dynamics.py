@@ -19,7 +19,6 @@ from _results import Claim, at_least, at_most
 
 from ir_description import load_robot
 from ir_kernels import CcdSettings, Chain, DynamicsModel, ccd, dc_bus
-from ir_kernels.limits import motion_extrema
 from ir_kernels.power import DcBusParameters
 from ir_kernels.spherical_wrist import SphericalWristIk
 from ir_values.arrays import FloatArray
@@ -96,9 +95,6 @@ def _dynamics(
             "",
             best(lambda: model.torque_bounds(c, T), 1, 10) * 1e6,
             "us",
-        ),
-        Row(
-            "motion extrema, 8 segments", "", best(lambda: motion_extrema(c, T), 1, 10) * 1e6, "us"
         ),
     ]
     agrees = _agreement(model, peer, few, robot)

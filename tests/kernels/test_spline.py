@@ -22,7 +22,7 @@ from spline_cases import (
 )
 
 from ir_kernels import CollisionModel, DynamicsModel, SplineCost, compiled
-from ir_kernels.power import REGENERATIONS, DcBusParameters, Regeneration, drive_energy
+from ir_kernels.power import REGENERATIONS, DcBusParameters, Regeneration, dc_bus
 from ir_kernels.spline_terms import SplineTerms
 from ir_values.arrays import FloatArray, IntArray
 
@@ -60,7 +60,7 @@ def by_definition(
     q, qd, qdd = (np.ascontiguousarray(along(control, interval, at, order)) for order in range(3))
     torque = dynamics.inverse_dynamics(q, qd, qdd)
     bus = DcBusParameters(t.capacity_energy, t.regeneration)
-    cost = t.energy_value * drive_energy(dynamics.axis_power(qd, torque), step, bus).mains
+    cost = t.energy_value * step * dc_bus(dynamics.axis_power(qd, torque), step, bus).mains.sum()
     cost += t.time_value * interval * (K - 3)
     cost += step * float((t.travel * (np.sqrt(qd**2 + 0.01**2) - 0.01)).sum())
 
@@ -139,8 +139,9 @@ def test_energy_is_that_of_the_drives(
         power = dynamics.drive_power(
             *(np.ascontiguousarray(along(control, interval, at, k)) for k in range(3))
         )
-        mains = drive_energy(power, interval / 2.0, DcBusParameters(capacity, regeneration)).mains
-        assert found.energy == pytest.approx(mains, rel=tolerance)
+        step = interval / 2.0
+        mains = dc_bus(power, step, DcBusParameters(capacity, regeneration)).mains
+        assert found.energy == pytest.approx(step * mains.sum(), rel=tolerance)
         assert found.value == pytest.approx(3.0 * found.energy, rel=1e-12)
 
 

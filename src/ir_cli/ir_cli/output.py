@@ -138,8 +138,8 @@ def _plain(value: Any) -> Any:
 class ProgressLine:
     """One line on stderr that is kept up to date, and gone at the end; quiet where nobody looks."""
 
-    def __init__(self, stream: TextIO | None = None) -> None:
-        self._stream = sys.stderr if stream is None else stream
+    def __init__(self) -> None:
+        self._stream = sys.stderr
         self._live = self._stream.isatty()
 
     def __enter__(self) -> ProgressLine:

@@ -54,9 +54,7 @@ def check_cell(cell: Cell, power: PowerData | None = None) -> tuple[CellFinding,
     return tuple(sorted(findings, key=lambda finding: finding.severity))
 
 
-def check_robot_cell(
-    cells: RobotCells, robot: str, power: PowerData | None = None
-) -> tuple[CellFinding, ...]:
+def check_robot_cell(cells: RobotCells, robot: str) -> tuple[CellFinding, ...]:
     """Return the same of the cell of one of several robots: stations that concern another robot
     alone are left to that one, and feet may look as they do.
     """
@@ -66,7 +64,7 @@ def check_robot_cell(
     feet = cells.feet_of_others(robot)
     return tuple(
         finding
-        for finding in check_cell(cell, power)
+        for finding in check_cell(cell)
         if finding.subject not in others
         and not (finding.severity == "warning" and finding.subject in feet)
     )

@@ -97,14 +97,14 @@ def load_power_data(name: str = "kr_c4") -> PowerData:
     return bundled_controller(name)
 
 
-def robot_marks(name: str = "kr210_r2700_extra") -> Mapping[str, str]:
-    """Return how sure each figure of a bundled robot is, H, M or L; see `confidence_marks`."""
-    return load_robot(name).marks
+def robot_marks() -> Mapping[str, str]:
+    """Return how sure each figure of the KR 210 is, H, M or L by its place."""
+    return load_robot().marks
 
 
-def power_marks(name: str = "kr_c4") -> Mapping[str, str]:
-    """Return how sure each figure of a bundled controller is, H, M or L; see `confidence_marks`."""
-    return load_power_data(name).marks
+def power_marks() -> Mapping[str, str]:
+    """Return how sure each figure of the KR C4 is, H, M or L by its place."""
+    return load_power_data().marks
 
 
 def load_power_parameters(

@@ -211,17 +211,14 @@ class SearchedIk:
     """All configurations within position_min, position_max (6,) rad that bring `chain`'s tcp to a
     pose.
 
-    branch: 0, 1, .. in the order of q. grid: values of q4 that are tried. Raises KernelError where
-    axes 2 and 3 are not parallel (1e-9).
+    branch: 0, 1, .. in the order of q. Raises KernelError where axes 2 and 3 are not parallel
+    (1e-9).
     """
 
-    def __init__(
-        self, chain: Chain, position_min: ArrayLike, position_max: ArrayLike, *, grid: int = GRID
-    ) -> None:
+    def __init__(self, chain: Chain, position_min: ArrayLike, position_max: ArrayLike) -> None:
         self.chain = chain
         self.lines = arm_lines(chain)
         self.position_min, self.position_max = limits(position_min, position_max)
-        self._grid = grid
 
     def solve(self, poses: ArrayLike) -> IkSet:
         """All solutions for poses (N, 4, 4) of the tcp in the world; tcp(q) meets the pose to 1e-9
@@ -237,11 +234,11 @@ class SearchedIk:
 
     def _all_of(self, targets: FloatArray) -> list[Found]:
         """Solutions on the grid, and on finer ones for poses that lack one of a pair."""
-        found = self._of(targets, self._grid)
+        found = self._of(targets, GRID)
         for times in FINER:
             count = np.bincount([pose for pose, _, _ in found], minlength=len(targets))
             for k in np.flatnonzero(count % 2):
-                again = self._of(targets[k : k + 1], times * self._grid)
+                again = self._of(targets[k : k + 1], times * GRID)
                 if len(again) > count[k]:
                     found = [each for each in found if each[0] != k]
                     found += [(int(k), branch, q) for _, branch, q in again]

@@ -29,26 +29,6 @@ class Extrema:
     time_of_maximum: FloatArray
 
 
-@dataclass(frozen=True)
-class MotionExtrema:
-    """Of a whole trajectory, per joint (n,): positions, and the largest |qd|, |qdd|, |qddd| with
-    their times.
-
-    rad, rad/s, rad/s^2, rad/s^3; times in s from the start of the trajectory.
-    """
-
-    position_min: FloatArray
-    position_max: FloatArray
-    velocity: FloatArray
-    acceleration: FloatArray
-    jerk: FloatArray
-    time_of_position_min: FloatArray
-    time_of_position_max: FloatArray
-    time_of_velocity: FloatArray
-    time_of_acceleration: FloatArray
-    time_of_jerk: FloatArray
-
-
 def segments(coefficients: ArrayLike, durations: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Coefficients (S, n, d + 1) and durations (S,) checked, or KernelError."""
     c = checked("coefficients", coefficients, None, None, None)
@@ -82,40 +62,6 @@ def polynomial_extrema(
     else:
         result = core.polynomial_extrema(c, T)
     return Extrema(*(data.read_only(array) for array in result))
-
-
-def motion_extrema(coefficients: ArrayLike, durations: ArrayLike) -> MotionExtrema:
-    """Extremes of q, |qd|, |qdd|, |qddd| per joint over all segments: coefficients (S, n, d + 1),
-    durations (S,) s.
-    """
-    c, T = segments(coefficients, durations)
-    starts = np.concatenate([[0.0], np.cumsum(T)[:-1]])[:, None]
-    joints = np.arange(c.shape[1])
-    position = polynomial_extrema(c, T)
-    low = position.minimum.argmin(axis=0)
-    high = position.maximum.argmax(axis=0)
-    largest = []
-    when = []
-    for order in (1, 2, 3):
-        e = polynomial_extrema(c, T, order)
-        downwards = -e.minimum > e.maximum
-        size = np.where(downwards, -e.minimum, e.maximum)
-        time = np.where(downwards, e.time_of_minimum, e.time_of_maximum) + starts
-        segment = size.argmax(axis=0)
-        largest.append(np.abs(size[segment, joints]))
-        when.append(time[segment, joints])
-    return MotionExtrema(
-        position_min=position.minimum[low, joints],
-        position_max=position.maximum[high, joints],
-        velocity=largest[0],
-        acceleration=largest[1],
-        jerk=largest[2],
-        time_of_position_min=(position.time_of_minimum + starts)[low, joints],
-        time_of_position_max=(position.time_of_maximum + starts)[high, joints],
-        time_of_velocity=when[0],
-        time_of_acceleration=when[1],
-        time_of_jerk=when[2],
-    )
 
 
 # Samples of motions along polynomials.

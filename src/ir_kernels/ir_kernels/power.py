@@ -12,8 +12,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ir_kernels import compiled, portable
-from ir_kernels.arguments import checked, finite
+from ir_kernels import compiled
+from ir_kernels.arguments import checked
 from ir_kernels.errors import KernelError
 from ir_kernels.reference import dynamics as reference
 from ir_values.arrays import FloatArray
@@ -55,22 +55,6 @@ class DcBus:
     mains: FloatArray
     dissipated: FloatArray
     stored: FloatArray
-
-
-@dataclass(frozen=True)
-class DriveEnergy:
-    """Where the drive energy of a trajectory goes, J: mains = sum(axes) + dissipated +
-    capacitor_change.
-
-    axes (n,): signed energy each axis took from the bus. peak [W]: the largest mains power of a
-    step.
-    """
-
-    mains: float
-    axes: FloatArray
-    dissipated: float
-    capacitor_change: float
-    peak: float
 
 
 def _steps(dt: ArrayLike, N: int) -> FloatArray:
@@ -118,25 +102,3 @@ def dc_bus(
     for array in result:
         array.setflags(write=False)
     return DcBus(*result)
-
-
-def drive_energy(
-    axis_power: ArrayLike, dt: ArrayLike, parameters: DcBusParameters, stored: float = 0.0
-) -> DriveEnergy:
-    """Drive energy of N steps with constant axis powers (N, n) W; the base load of the controller
-    is not in it.
-
-    Sample the power at the middles of the steps and the error falls with dt^2. Raises KernelError.
-    """
-    power = checked("axis_power", axis_power, None, None)
-    steps = _steps(dt, len(power))
-    bus = dc_bus(power, steps, parameters, stored)
-    axes = finite("axis_power", portable.matmul(steps, power))
-    axes.setflags(write=False)
-    return DriveEnergy(
-        mains=float(portable.matmul(steps, bus.mains)),
-        axes=axes,
-        dissipated=float(portable.matmul(steps, bus.dissipated)),
-        capacitor_change=float(bus.stored[-1] - stored),
-        peak=float(bus.mains.max()),
-    )

@@ -55,9 +55,9 @@ class Status:
             object.__setattr__(self, "code", StatusCode(self.code))
 
     @classmethod
-    def success(cls, message: str = "", source: str = "") -> Status:
+    def success(cls, message: str = "") -> Status:
         """SUCCESS, with a remark if there is one."""
-        return cls(StatusCode.SUCCESS, message, source)
+        return cls(StatusCode.SUCCESS, message)
 
     @property
     def ok(self) -> bool:

@@ -26,11 +26,14 @@ class Notice(NamedTuple):
     sentence: str
 
 
+_KEPT = 200  # notices that wait to be taken; the oldest go first
+
+
 class Notices:
     """A bounded list of notices; an immediate repetition is kept once."""
 
-    def __init__(self, capacity: int = 200) -> None:
-        self._pending: deque[Notice] = deque(maxlen=capacity)
+    def __init__(self) -> None:
+        self._pending: deque[Notice] = deque(maxlen=_KEPT)
         self.last: Notice | None = None
 
     def add(self, level: Level, sentence: str) -> None:

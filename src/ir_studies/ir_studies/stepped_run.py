@@ -195,15 +195,14 @@ class SteppedRun:
         self.signals.append(SignalChange(self.simulation.time, signal.name, signal.value))
 
 
-def driven_program(
-    cell: Cell, movements: Sequence[PlannedMovement], plant: str = "nominal", seed: int = 0
-) -> SteppedRun:
-    """A planned program, driven from where its first movement begins. StudyError where it can't
-    be driven to its end.
+def driven_program(cell: Cell, movements: Sequence[PlannedMovement]) -> SteppedRun:
+    """A planned program on the nominal plant, driven from where its first movement begins.
+
+    StudyError where it can't be driven to its end.
     """
     first = next(step for step in movements if step.trajectory is not None)
     assert first.trajectory is not None
-    run = SteppedRun(cell, plant, seed)
+    run = SteppedRun(cell)
     run.place(first.trajectory.positions[0])
     result = run.run(movements)
     if not result.status.ok:

@@ -36,9 +36,9 @@ def replacing_bytes(path: str | Path, new: bool = False) -> Iterator[IO[bytes]]:
 
 
 @contextmanager
-def replacing_text(path: str | Path, new: bool = False) -> Iterator[IO[str]]:
+def replacing_text(path: str | Path) -> Iterator[IO[str]]:
     """As `replacing_bytes`, for text in UTF-8 whose line ends stay as they are written."""
-    with _replacing(path, new, "w", encoding="utf-8", newline="") as stream:
+    with _replacing(path, False, "w", encoding="utf-8", newline="") as stream:
         yield stream
 
 

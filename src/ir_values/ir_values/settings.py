@@ -176,13 +176,11 @@ def check_settings(settings: Any) -> None:
         each.check(getattr(settings, each.name))
 
 
-def settings_table(settings: Any, prefix: str = "", *, read_only: bool = False) -> str:
-    """Write the settings, with those of their stages, as a Markdown table for the documentation;
-    read_only: all are fixed at the start.
-    """
+def settings_table(settings: Any, prefix: str = "") -> str:
+    """Write the settings, with those of their stages, as a Markdown table for the documentation."""
     rows = ["| Parameter | Default | Unit | Range | Meaning |", "|---|---|---|---|---|"]
     for name, each in tree(settings).items():
-        fixed = " Fixed at start." if read_only or each.read_only else ""
+        fixed = " Fixed at start." if each.read_only else ""
         default = str(each.default).lower() if isinstance(each.default, bool) else str(each.default)
         rows.append(
             f"| `{prefix}{name}` | {default} | {each.unit} | {each.bounds} | "

@@ -52,14 +52,13 @@ def write_plan(
     request: RecordedRequest,
     planner: Planner,
     roots: FileRoots | None = None,
-    overwrite: bool = False,
 ) -> Path:
     """Write the plan of a program, with its request, the planner's cell and its settings, as a
     recording.
 
     RecorderError or WriteError where that can't be.
     """
-    writer = RecordingWriter(path, overwrite=overwrite, roots=roots or ANYWHERE)
+    writer = RecordingWriter(path, roots=roots or ANYWHERE)
     now = time.time_ns()
     cell = planner.cell
     facts = {contents.PLAN: "never driven"}

@@ -36,15 +36,10 @@ from ir_values.yaml_tree import Node, Scalar, parse_yaml
 # The confidence mark of each figure of a robot or power file, by its place.
 
 
-def confidence_marks(text: str, source: str = "<text>") -> dict[str, str]:
+def marks_of(node: Node) -> dict[str, str]:
     """Return H, M or L by place: "drives.friction_viscous_nms_rad", "links.link_2.mass_kg",
     "modes.HIBERNATION.controller_w". Entries of lists go by their name.
     """
-    return marks_of(parse_yaml(text, source, RobotFileError))
-
-
-def marks_of(node: Node) -> dict[str, str]:
-    """The same of a tree."""
     return {place: _text(figure, "confidence") for place, figure in _figures(node, "")}
 
 

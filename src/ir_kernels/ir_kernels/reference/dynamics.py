@@ -135,13 +135,9 @@ def counterbalance(data: DynamicsData, q: FloatArray) -> FloatArray:
     return torque
 
 
-def rigid(
-    data: DynamicsData, q: FloatArray, qd: FloatArray, qdd: FloatArray, with_gravity: bool = True
-) -> FloatArray:
+def rigid(data: DynamicsData, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
     """H qdd + h (N, n), the arm alone."""
-    columns = rigid_body_torque(
-        data, list(np.sin(q).T), list(np.cos(q).T), list(qd.T), list(qdd.T), with_gravity
-    )
+    columns = rigid_body_torque(data, list(np.sin(q).T), list(np.cos(q).T), list(qd.T), list(qdd.T))
     return np.stack(columns, axis=1)
 
 

@@ -71,13 +71,9 @@ def status_from_msg(msg: StatusMsg) -> Status:
     return Status(int(msg.code), msg.message, msg.source)
 
 
-def configuration_to_msg(
-    joint_names: Sequence[str], q: FloatArray, stamp_ns: int = 0
-) -> JointState:
+def configuration_to_msg(joint_names: Sequence[str], q: FloatArray) -> JointState:
     """Joint values q (n,) [rad] with their names."""
-    msg = JointState(name=list(joint_names), position=float_array(q))
-    msg.header.stamp = time_to_msg(stamp_ns)
-    return msg
+    return JointState(name=list(joint_names), position=float_array(q))
 
 
 def configuration_given(msg: JointState) -> bool:
@@ -215,13 +211,9 @@ def _text(values: FloatArray) -> str:
 MAX_POINTS = 100_000
 
 
-def trajectory_to_msg(
-    trajectory: JointTrajectory, stamp_ns: int = 0, frame_id: str = ""
-) -> JointTrajectoryMsg:
-    """All points; stamp 0 means: start at once."""
+def trajectory_to_msg(trajectory: JointTrajectory) -> JointTrajectoryMsg:
+    """All points; its stamp 0 means: start at once."""
     msg = JointTrajectoryMsg(joint_names=list(trajectory.joint_names))
-    msg.header.stamp = time_to_msg(stamp_ns)
-    msg.header.frame_id = frame_id
     msg.points = [
         JointTrajectoryPoint(
             positions=float_array(trajectory.positions[k]),

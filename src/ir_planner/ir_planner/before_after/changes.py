@@ -230,7 +230,7 @@ _SAME_TIME = 0.005  # s
 _SAMPLES = 200
 
 
-def changes(today: Costed, planned: Costed, most: int = MOST) -> tuple[StepChange, ...]:
+def changes(today: Costed, planned: Costed) -> tuple[StepChange, ...]:
     """The changes that save most from today's program to the planned one, those of least work
     first.
     """
@@ -240,7 +240,7 @@ def changes(today: Costed, planned: Costed, most: int = MOST) -> tuple[StepChang
     worth = sorted(
         (one for one in found if one.saving.saved >= _WORTH_IT), key=lambda one: -one.saving.saved
     )
-    return tuple(sorted(worth[:most], key=lambda one: (one.work, -one.saving.saved)))
+    return tuple(sorted(worth[:MOST], key=lambda one: (one.work, -one.saving.saved)))
 
 
 def _keyed(hops: Sequence[CostedHop]) -> Iterator[tuple[tuple[str, int], CostedHop]]:

@@ -8,7 +8,6 @@ import numpy as np
 
 from ir_description import Body, Cell
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.checks.distances import ClearanceProfile
 from ir_planner.scene import PlanningScene
 from ir_values.arrays import FloatArray
 
@@ -117,17 +116,8 @@ def station_shapes(name: str, pose: FloatArray) -> tuple[Shape, ...]:
     )
 
 
-def movement_shapes(
-    trajectory: JointTrajectory, scene: PlanningScene, clearance: ClearanceProfile | None = None
-) -> tuple[Shape, ...]:
-    """The path of the tcp, and the closest pair where it is known."""
+def movement_shapes(trajectory: JointTrajectory, scene: PlanningScene) -> tuple[Shape, ...]:
+    """The path of the tcp."""
     times = np.linspace(trajectory.times[0], trajectory.times[-1], 60)
     path = scene.chain.tcp_poses(trajectory.sample(times).q)[:, :3, 3]
-    shapes = [Shape("movement", "line", np.eye(4), np.array([0.008, 0.0, 0.0]), PATH, path)]
-    pair = clearance.smallest if clearance is not None else None
-    if pair is not None:
-        ends = np.stack([pair.point_a, pair.point_b])
-        shapes.append(
-            Shape("closest", "line", np.eye(4), np.array([0.012, 0.0, 0.0]), CLOSEST, ends)
-        )
-    return tuple(shapes)
+    return (Shape("movement", "line", np.eye(4), np.array([0.008, 0.0, 0.0]), PATH, path),)

@@ -68,16 +68,15 @@ def mapped(
     context: Context,
     improvement: int,
     most: Sequence[int],
-    threads: int = 0,
 ) -> list[Result]:
     """task(item, context of its own) for every item, in order; what each did is added to
     `context`'s journal.
 
-    improvement: work of each for better answers; most: of each at all. threads: 0: those of the
-    context's work. Raises what the first failing task raises, CancelledError when asked to stop.
+    improvement: work of each for better answers; most: of each at all. Raises
+    what the first failing task raises, CancelledError when asked to stop.
     """
     own = [_own(context, improvement, left) for left in most]
-    count = min(threads or context.work.threads or len(os.sched_getaffinity(0)), len(items))
+    count = min(context.work.threads or len(os.sched_getaffinity(0)), len(items))
     if count <= 1:
         results = [task(item, mine) for item, mine in zip(items, own, strict=True)]
     else:

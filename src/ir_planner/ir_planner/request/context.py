@@ -100,10 +100,9 @@ class Journal:
         if text:
             self.stages.append(PlanningStage(name, 0.0, text))
 
-    def reject(self, reason: str, count: int = 1) -> None:
-        """Count candidates dropped for one reason."""
-        if count:
-            self.rejected[reason] += count
+    def reject(self, reason: str) -> None:
+        """Count a candidate dropped for a reason."""
+        self.rejected[reason] += 1
 
     def keep(self, log: SearchLog) -> None:
         """Let a log of a search travel with the answer; of searches at one station the first."""

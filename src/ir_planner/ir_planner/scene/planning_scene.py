@@ -125,9 +125,9 @@ Stops = str | tuple[str, ...]
 """A station or a path whose contacts are allowed, "" for none; several, each in its own zone."""
 
 
-def load_text(cell: Cell, held: str = "") -> str:
+def load_text(cell: Cell) -> str:
     """How the load is written: "gripper+part", "gripper", "none"."""
-    names = [load.name for load in cell.loads(held)]
+    names = [load.name for load in cell.loads("")]
     return LOAD_SEPARATOR.join(names) or NO_LOAD
 
 

@@ -48,9 +48,7 @@ class GridCheck:
         return self.count > 0 and not (self.off_grid or self.backward or self.gaps)
 
 
-def check_grid(
-    joints: JointSeries, power: PowerSeries | None, period_ns: int = PERIOD_NS
-) -> GridCheck:
+def check_grid(joints: JointSeries, power: PowerSeries | None) -> GridCheck:
     """Checks the stamps of /joint_states."""
     steps = np.diff(joints.stamp_ns)
     gaps = []
@@ -58,9 +56,9 @@ def check_grid(
     origin = int(joints.stamp_ns[0]) if len(joints.stamp_ns) else 0
     off_grid = 0
     part_start = 0
-    for k in [*np.flatnonzero(steps > period_ns).tolist(), len(steps)]:
+    for k in [*np.flatnonzero(steps > PERIOD_NS).tolist(), len(steps)]:
         stretch = joints.stamp_ns[part_start : k + 1]
-        off_grid += int(np.count_nonzero((stretch - origin) % period_ns))
+        off_grid += int(np.count_nonzero((stretch - origin) % PERIOD_NS))
         if k == len(steps):
             break
         part_start = k + 1

@@ -139,12 +139,9 @@ def _name(text: str) -> str:
     return Signal.parse(text).name
 
 
-def robot_findings(
-    analyses: Mapping[str, Analysis], tolerances: Tolerances | None = None
-) -> tuple[Finding, ...]:
+def robot_findings(analyses: Mapping[str, Analysis]) -> tuple[Finding, ...]:
     """What holds between the robots of a recording."""
-    bounds = tolerances or Tolerances()
-    return (*_distances(analyses, bounds), *_turns(analyses))
+    return (*_distances(analyses, Tolerances()), *_turns(analyses))
 
 
 def _distances(analyses: Mapping[str, Analysis], bounds: Tolerances) -> Iterator[Finding]:

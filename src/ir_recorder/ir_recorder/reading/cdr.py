@@ -149,9 +149,10 @@ class Columns:
             first = own
         return True
 
-    def stamps(self, path: str = "header.stamp") -> IntArray:
-        """A time field as (N,) nanoseconds."""
-        return self.integers(f"{path}.sec") * 1_000_000_000 + self.integers(f"{path}.nanosec")
+    def stamps(self) -> IntArray:
+        """The stamps of the headers as (N,) nanoseconds."""
+        seconds = self.integers("header.stamp.sec")
+        return seconds * 1_000_000_000 + self.integers("header.stamp.nanosec")
 
 
 MOST_JOINTS = 64  # that a message of joint states names

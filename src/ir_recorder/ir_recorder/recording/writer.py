@@ -113,9 +113,7 @@ class RecordingWriter:
         self._sequence[channel] = 0
         return channel
 
-    def write(
-        self, channel: int, log_time: int, data: bytes, publish_time: int | None = None
-    ) -> None:
+    def write(self, channel: int, log_time: int, data: bytes) -> None:
         """Appends one message's CDR bytes.
 
         Players read in file order, so a time that runs back by less than REORDERED is set to the
@@ -125,13 +123,7 @@ class RecordingWriter:
             log_time = self._newest
         self._newest = log_time
         with self._storage():
-            self._writer.add_message(
-                channel,
-                log_time,
-                data,
-                log_time if publish_time is None else publish_time,
-                self._sequence[channel],
-            )
+            self._writer.add_message(channel, log_time, data, log_time, self._sequence[channel])
         self._sequence[channel] += 1
         self._messages += 1
         self._first = log_time if self._first is None else min(self._first, log_time)
