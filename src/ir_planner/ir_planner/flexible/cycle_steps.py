@@ -38,8 +38,8 @@ from ir_planner.program import (
     common_program,
     placed_steps,
     rests_at,
+    savings_of,
 )
-from ir_planner.program.savings import savings_of
 from ir_planner.request import Context
 from ir_planner.service import ServiceLine
 from ir_planner.timing import Movement

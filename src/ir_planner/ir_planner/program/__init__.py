@@ -28,7 +28,7 @@ from ir_planner.program.request import (
     nobody,
     unknown_searches,
 )
-from ir_planner.program.savings import common_program
+from ir_planner.program.savings import common_program, savings_of
 from ir_planner.program.spreads import Spreads, with_intervals
 from ir_planner.program.standby import (
     PauseLengths,
@@ -98,6 +98,7 @@ __all__ = [
     "prepared",
     "program_of",
     "rests_at",
+    "savings_of",
     "spent",
     "station_nodes",
     "switch_times",
