@@ -8,6 +8,7 @@ other. The settings are environment variables because the tests' own subprocesse
 from __future__ import annotations
 
 import dataclasses
+import gc
 import math
 import os
 import sys
@@ -35,6 +36,12 @@ def pytest_configure(config: pytest.Config) -> None:
     apply_network()
     os.environ["RCUTILS_COLORIZED_OUTPUT"] = "0"
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
+
+
+def pytest_collection_finish() -> None:
+    """What was collected lives as long as the session: the garbage collector need not walk it."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True)

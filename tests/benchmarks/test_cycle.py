@@ -37,6 +37,7 @@ def test_a_refused_cycle_time_is_passed_over() -> None:
     assert law == pytest.approx(0.0)
 
 
+@pytest.mark.long
 def test_the_common_program_lasts_as_long_as_its_slowest_joints() -> None:
     programs = Programs("open", 0)
     stops = ("p1", "conv", "park")

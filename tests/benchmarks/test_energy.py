@@ -31,6 +31,7 @@ def test_phases_last_as_long_as_those_of_the_planner() -> None:
         assert theirs <= 1.02 * mine + 0.02
 
 
+@pytest.mark.long
 def test_the_baseline_keeps_the_limits_and_its_duration(planner: Planner) -> None:
     scene = planner.scene()
     drives = Drives(scene)

@@ -13,7 +13,8 @@ from ir_krl.write import STYLES
 from ir_planner import Planner
 
 
-@pytest.mark.parametrize("seed", [3, pytest.param(1, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [3, 1])
 def test_a_drawn_cell_comes_back_in_every_style(seed: int) -> None:
     """Law: seconds and joules of each step within 0.5 % of its comment, the same loads, contacts
     and modes, certified again.

@@ -30,6 +30,7 @@ def test_the_judge_of_meshes_notices_other_corners(tmp_path: Path) -> None:
     assert misread_mesh(path, triangles[1:])
 
 
+@pytest.mark.long
 def test_worlds_of_strangers_are_read_right_or_refused(tmp_path: Path) -> None:
     """Frames, includes, Collada trees and scenes of one seed."""
     for case in worlds(np.random.default_rng(1), tmp_path):

@@ -147,6 +147,7 @@ def test_parameters_of_another_robot_are_refused_with_both_names(
     assert "are of robot somebody: the cell has kr6_r900_2" in said
 
 
+@pytest.mark.long
 def test_movements_are_planned_that_identify_an_own_robot(cell: str, tmp_path: Path) -> None:
     words = [cell, "--seconds", "3", "--postures", "1", "-o", str(tmp_path / "out")]
     assert main(["energy", "excite", *words]) == 0

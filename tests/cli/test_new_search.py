@@ -52,6 +52,7 @@ def test_it_plans_by_its_name_and_says_whose_it_is(site: Path) -> None:
     assert f"planner {NAME} is of the package ir-search-over-the-top 0.1.0" in answer.stdout
 
 
+@pytest.mark.long
 def test_no_default_asks_it(site: Path) -> None:
     words = ("-m", "ir_cli.main", "ask", "move", "demo", "home", "park", "--json")
     with_it = json.loads(run(site, *words).stdout)
@@ -66,6 +67,7 @@ def test_it_passes_the_contract(site: Path) -> None:
     assert "10 passed" in answer.stdout
 
 
+@pytest.mark.long
 def test_it_reaches_workers_of_the_arena(site: Path, tmp_path: Path) -> None:
     (tmp_path / "arena.yaml").write_text(SETTINGS)
     words = ("-m", "ir_cli.main", "study", "arena", str(tmp_path / "arena.yaml"), "--workers", "1")

@@ -114,7 +114,9 @@ def after_a_stop(mass_error: float, seed: int) -> LoadFinding | None:
     return outcome.load_check
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 6))]
+)
 def test_a_declared_load_is_not_noticed_after_a_stop_and_another_one_is(seed: int) -> None:
     as_declared = after_a_stop(0.0, seed)
     assert as_declared is not None

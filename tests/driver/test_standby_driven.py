@@ -79,7 +79,9 @@ def close(measured: float, planned: float) -> None:
     assert abs(measured - planned) <= max(JOULES, SHARE * planned), (measured, planned)
 
 
-@pytest.mark.parametrize("seed", range(24))
+@pytest.mark.parametrize(
+    "seed", [*range(6), *(pytest.param(seed, marks=pytest.mark.long) for seed in range(6, 24))]
+)
 def test_a_pause_of_known_length_costs_what_was_planned(seed: int) -> None:
     """PROFIenergy's start and end; the driver goes through the modes by itself."""
     case = Case(seed)
@@ -100,7 +102,10 @@ def test_a_pause_of_known_length_costs_what_was_planned(seed: int) -> None:
     close(plant.mains.energy() - begun, planned.energy)
 
 
-@pytest.mark.parametrize("seed", range(24, 60))
+@pytest.mark.parametrize(
+    "seed",
+    [*range(24, 34), *(pytest.param(seed, marks=pytest.mark.long) for seed in range(34, 60))],
+)
 def test_a_policy_costs_what_was_planned_whenever_the_pause_ends(seed: int) -> None:
     """A PLC asks for each mode at its switch time, while the pause is on, and wakes the robot at
     its end.

@@ -184,7 +184,7 @@ CARRIED = (
 )
 
 
-@pytest.mark.parametrize("mass", [0, 50, 150])
+@pytest.mark.parametrize("mass", [0, pytest.param(50, marks=pytest.mark.long), 150])
 def test_a_comparison_carries_what_load_says(
     mass: int, planner: Planner, followed: Callable[..., Followed]
 ) -> None:
@@ -202,7 +202,7 @@ def test_a_comparison_carries_what_load_says(
 @pytest.mark.parametrize(
     ("more", "carried"),
     [
-        ("$LOAD.M=90\n", ["$LOAD", "$LOAD_2"]),
+        pytest.param("$LOAD.M=90\n", ["$LOAD", "$LOAD_2"], marks=pytest.mark.long),
         ("$LOAD={M -1}\n", ["$LOAD", "$LOAD_2"]),  # as the cell has it
         ("$LOAD.M=90\nPTP {A1 20}\n$LOAD.M=50\n", ["$LOAD", "$LOAD_2", "$LOAD"]),
     ],
@@ -264,8 +264,8 @@ def test_a_load_with_a_negative_inertia_is_refused(
 @pytest.mark.parametrize(
     "done",
     [
-        "WAIT FOR $IN[9]\n$OUT[5]=TRUE",
-        "WAIT SEC 0.5\n$OUT[5]=TRUE\nWAIT SEC 0.5",
+        pytest.param("WAIT FOR $IN[9]\n$OUT[5]=TRUE", marks=pytest.mark.long),
+        pytest.param("WAIT SEC 0.5\n$OUT[5]=TRUE\nWAIT SEC 0.5", marks=pytest.mark.long),
         "WAIT FOR $IN[9]\n$OUT[5]=TRUE\nWAIT SEC 1\n$OUT[5]=FALSE\nWAIT SEC 0\n$OUT[5]=TRUE",
     ],
 )

@@ -78,13 +78,19 @@ def may_know_ros(package: str, module: Path) -> bool:
     return inside.parts[0] == "node" or module.name in ("node.py", "parameters.py")
 
 
+@cache
+def imports_of(module: Path) -> tuple[tuple[str, int], ...]:
+    """The same of a file."""
+    return tuple(imports(parsed(module)))
+
+
 def violations(package: str, forbidden: object) -> list[str]:
     """Imports of the package for which forbidden(module, name) holds, as file:line name."""
     assert callable(forbidden)
     return [
         f"{module.relative_to(SRC)}:{line} {name}"
         for module in modules(package)
-        for name, line in imports(parsed(module))
+        for name, line in imports_of(module)
         if forbidden(module, name)
     ]
 

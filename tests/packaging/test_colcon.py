@@ -68,6 +68,7 @@ def test_colcon_finds_both_source_trees_and_nothing_else(tmp_path: Path) -> None
     assert set(listed.stdout.split()) == python | {"ir_msgs", "ir_bringup"}, listed.stderr
 
 
+@pytest.mark.long
 def test_colcon_builds_the_python_packages(tmp_path: Path) -> None:
     prefix = build(tmp_path, "--packages-ignore", "ir_msgs")
     for node in NODES:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -32,6 +33,7 @@ ROOMS = {
 }  # fmt: skip
 
 
+@cache
 def imported(package: str, module: Path) -> list[tuple[str, str, int]]:
     """Rooms of the package that a module imports: room, what follows its name ("": its face),
     line.

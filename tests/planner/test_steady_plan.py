@@ -119,14 +119,6 @@ def test_the_program_waits_for_every_machine_at_least_as_long_as_it_works() -> N
         assert after >= seconds - ROUNDING
 
 
-def test_energy_per_part_is_less_at_a_lower_throughput() -> None:
-    slower = planned(20.0).cycle
-    faster = at_thirty().cycle
-    assert slower is not None
-    assert faster is not None
-    assert slower.joules <= faster.joules * (1.0 + SETTLED)
-
-
 @pytest.mark.long
 def test_energy_per_part_never_rises_when_the_throughput_falls() -> None:
     joules = []

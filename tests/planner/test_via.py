@@ -52,7 +52,7 @@ def passes(trajectory: object, places: list[np.ndarray], tolerance: float) -> bo
 
 
 @pytest.mark.parametrize("cell", CELLS)
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_places_are_passed_in_order_and_never_slower_than_with_stops(
     planners: dict[str, Planner], cell: str, seed: int
 ) -> None:
@@ -137,7 +137,7 @@ def leaning(planner: Planner, states: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("cell", CELLS)
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_the_tool_leans_from_where_the_whole_movement_begins(
     planners: dict[str, Planner], cell: str, seed: int
 ) -> None:

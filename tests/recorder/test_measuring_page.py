@@ -44,6 +44,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
+@pytest.mark.long
 def test_the_commands_of_the_page_lead_from_a_programme_to_a_plan(
     folder: Path, demo_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
