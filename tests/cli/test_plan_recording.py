@@ -46,7 +46,7 @@ def assert_planned_figures_are_those_of_the_answer(analysis: Analysis, raw: RawR
     assert ("proved: free of collision" in drawn) == report.certified
     page = comparison_html([(analysis, ()), (analysis, ())])
     assert page.count(f"<b>{energy}</b>") >= 2
-    assert page.count("predicted, not driven") == 2
+    assert page.count("predicted, not driven") == 3
     assert page.count(f"<b>{joules(steps[0].report.energy)}</b>") >= 2
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ir_msgs_py.savings import ProgramSavings
-from ir_recorder.analysis import Analysis, Finding
+from ir_recorder.analysis import Analysis, Finding, Verdict
 from ir_recorder.analysis.flows import energy_flows
 from ir_recorder.analysis.production import (
     Amount,
@@ -25,6 +25,7 @@ from ir_recorder.analysis.production import (
 )
 from ir_recorder.analysis.results import ProgramTotals, Share
 from ir_recorder.analysis.steps import step_label
+from ir_recorder.report.answer import Answer
 from ir_recorder.report.bars import Piece, Row, bars
 from ir_recorder.report.charts import Point, front_part
 from ir_recorder.report.costs import (
@@ -53,7 +54,8 @@ from ir_recorder.report.number_text import (
 )
 from ir_recorder.report.page import PAGE_START, asset
 from ir_recorder.report.series import Curves, Json, packed, stretches
-from ir_recorder.report.tables import table
+from ir_recorder.report.shell import badge, shell
+from ir_recorder.report.tables import COMPACT, table
 from ir_recorder.report.whole_line import of_recording, with_ends
 from ir_values.files import ANYWHERE, FileRoots
 
@@ -81,26 +83,86 @@ def comparison_html(compared: Sequence[Compared], costs: Costs | None = None) ->
         "end": _longest(analyses),
         "axes": [_powers(analyses, names)] if _longest(analyses) else [],
     }
+    prices = costs or Costs()
     parts = {
-        "title": text(f"{len(analyses)} recordings compared"),
-        "subtitle": text(
-            "of different cells, each by itself"
-            if _apart(analyses)
-            else f"{names[0]} is what the others are held against"
-        ),
         "problems": _problems(analyses, names),
-        "message": text(_message(analyses, names, costs or Costs())),
-        "paid": _paid(compared, names, costs or Costs()),
+        "paid": _paid(compared, names, prices),
         "supply": "" if any(map(drives_only, analyses)) else ", at the mains",
-        "assumed": assumed_section(costs or Costs()),
+        "assumed": assumed_section(prices),
         "figures": _figures(compared, names),
         "front": front_part(_points(analyses, names)),
         "steps": _steps(analyses, names),
-        "style": asset("page.css"),
         "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
-        "script": "\n".join(asset(script) for script in SCRIPTS),
     }
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("compare.html"))
+    main = re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("compare.html"))
+    origins = "; ".join(dict.fromkeys(plant_of(each) for each in analyses))
+    kind, words = _verdict(compared)
+    return shell(
+        f"{len(analyses)} recordings compared",
+        "of different cells, each by itself"
+        if _apart(analyses)
+        else f"{names[0]} is what the others are held against",
+        _answer(analyses, names, prices).html() + main,
+        badges=[f'<p class="source open">{text(origins)}</p>', badge(words, kind)],
+        script="\n".join(asset(script) for script in SCRIPTS),
+    )
+
+
+def _verdict(compared: Sequence[Compared]) -> tuple[str, str]:
+    """The badge: whether the checks of all that was driven hold."""
+    made = [
+        check
+        for _, checks in compared
+        for check in checks
+        if check.verdict is not Verdict.NOT_CHECKED
+    ]
+    if not made:
+        return "open", "Nothing driven to check"
+    failed = sum(check.verdict is Verdict.FAILS for check in made)
+    if failed:
+        return "bad", f"{failed} of {len(made)} checks fail"
+    return "good", f"All {len(made)} checks hold"
+
+
+def _answer(analyses: Sequence[Analysis], names: Sequence[str], costs: Costs) -> Answer:
+    """Which program costs least, how sure that is, and what to do; of different cells none is held
+    against another.
+    """
+    cycles = [production_of(analysis) for analysis in analyses]
+    if _apart(analyses):
+        return Answer("Nothing to hold against another", "They are of different cells.")
+    known = {
+        name: costs.energy_of_year(cycle).of(costs.money)
+        for name, cycle in zip(names, cycles, strict=True)
+        if cycle is not None
+    }
+    alike = len({cycle.drives_only for cycle in cycles if cycle is not None}) == 1
+    if len(known) < len(cycles) or not alike:
+        why = "What a year costs is not known of each, or not of the same supply."
+        return Answer("No program is shown to cost least", why)
+    first = known[names[0]]
+    least = min(known, key=lambda name: known[name].value)
+    said = [f"{name} {yearly_money(known[name].value, costs.currency)}" for name in names[:_NAMED]]
+    words = f"A year in shifts: {', '.join(said)}."
+    intervals = [
+        f"{name} {yearly_span(year.low, year.high)} {costs.currency}"
+        for name, year in list(known.items())[:_NAMED]
+        if year.low < year.high
+    ]
+    sure = "One run each: a year of it has no interval."
+    if intervals:
+        sure = f"90 % intervals: {', '.join(intervals)}; a run that was driven has none."
+    if least == names[0] and all(year.low > first.high for year in list(known.values())[1:]):
+        result = f"{least} costs least"
+        return Answer(result, words, sure, f"Keep {least}.")
+    if known[least].high < first.low:
+        less = yearly_money(first.value - known[least].value, costs.currency)
+        return Answer(f"{least}: {less} less a year", words, sure, f"Drive {least}.")
+    result = f"None is shown to cost less than {names[0]}"
+    return Answer(result, words, sure, "Choose by what else they differ in: time, peak, clearance.")
+
+
+_NAMED = 4  # recordings in a sentence
 
 
 def _names(analyses: Sequence[Analysis]) -> list[str]:
@@ -136,25 +198,6 @@ def _problems(analyses: Sequence[Analysis], names: Sequence[str]) -> str:
     return (
         f'<div class="problems calm"><b>Notes</b><ul>{"".join(items)}</ul></div>' if items else ""
     )
-
-
-def _message(analyses: Sequence[Analysis], names: Sequence[str], costs: Costs) -> str:
-    """Which program costs least, and how much less than the first one, where their intervals lie
-    apart.
-    """
-    cycles = [production_of(analysis) for analysis in analyses]
-    known = [cycle for cycle in cycles if cycle is not None]
-    if _apart(analyses) or len(known) < len(cycles) or len({c.drives_only for c in known}) > 1:
-        return "Energy costs of a year"
-    years = [costs.energy_of_year(cycle).of(costs.money) for cycle in known]
-    least = min(range(len(years)), key=lambda k: years[k].value)
-    price = yearly_money(years[least].value, costs.currency)
-    if least == 0 and all(year.low > years[0].high for year in years[1:]):
-        return f"{names[0]} costs least: {price} a year"
-    less = years[0].value - years[least].value
-    if years[least].high < years[0].low:
-        return f"{names[least]}: {yearly_money(less, costs.currency)} less a year than {names[0]}"
-    return f"No program is shown to cost less than {names[0]}"
 
 
 def _paid(compared: Sequence[Compared], names: Sequence[str], costs: Costs) -> str:
@@ -301,13 +344,17 @@ def _cycle(cycle: Production | None) -> str:
     )
 
 
+_BESIDE = 2  # recordings whose short figures a phone shows beside each other
+
+
 def _figures(compared: Sequence[Compared], names: Sequence[str]) -> str:
     rows = [
         _measured_row(name, unit, value, compared)
         for name, unit, value in _VALUES
         if any(math.isfinite(value(analysis)) for analysis, _ in compared)
     ]
-    return table(("", *(f">{name}" for name in names)), rows, "Runs in figures")
+    kind = COMPACT if len(names) <= _BESIDE else ""
+    return table(("", *(f">{name}" for name in names)), rows, "Runs in figures", kind)
 
 
 def _measured_row(
