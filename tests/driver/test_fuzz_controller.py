@@ -162,7 +162,7 @@ def keep_the_laws(make, plan, start, sequence):
 short_sequences = st.lists(st.tuples(actions, st.integers(1, 60)), max_size=8)
 
 
-@settings(max_examples=120, deadline=None, derandomize=True)
+@settings(max_examples=50, deadline=None, derandomize=True)
 @given(sequence=short_sequences)
 def test_the_time_to_operate_of_an_ended_pause_is_kept_from_every_state(
     make, plan, start, sequence

@@ -12,6 +12,14 @@ import numpy as np
 import pytest
 import yaml
 
+from ir_cli.excitation_programme import (
+    MODES,
+    Identified,
+    Programme,
+    ProgrammeStep,
+    straight,
+    write_programme,
+)
 from ir_cli.main import main
 from ir_cli.traces import read_trace
 from ir_description import data_sheet, load_cell, load_power_data
@@ -34,23 +42,28 @@ def words(command: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the first two commands of the page have been run: a programme, and what a plant
-    showed.
-    """
-    place = tmp_path_factory.mktemp("measuring")
-    with contextlib.chdir(place):
-        for command in COMMANDS[:2]:
-            assert main(words(command)) == 0
+    """A programme of two movements and three modes, and what a plant showed."""
+    place = tmp_path_factory.mktemp("excitation")
+    home = np.array(load_cell("demo").machine_home)
+    there = home + np.array([0.3, 0.0, 0.0, 0.0, 0.2, 0.0])
+    steps = (
+        *(ProgrammeStep(mode, "gripper", mode=mode, seconds=1.5) for mode in MODES[:3]),
+        ProgrammeStep("out", "gripper", straight(JOINT_NAMES, home, there, 1.5)),
+        ProgrammeStep("back", "gripper+gear", straight(JOINT_NAMES, there, home, 1.5)),
+    )
+    write_programme(Programme(steps, Identified((), np.zeros(0))), place, "demo")
+    assert main(["energy", "drive", str(place), "--plant", "typical:3"]) == 0
     return place
 
 
 @pytest.mark.long
 def test_the_commands_of_the_page_lead_from_a_programme_to_a_plan(
-    folder: Path, demo_file: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, demo_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (folder / "out" / "demo.mcap").write_bytes(demo_file.read_bytes())
-    with contextlib.chdir(folder):
-        for command in COMMANDS[2:]:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "demo.mcap").write_bytes(demo_file.read_bytes())
+    with contextlib.chdir(tmp_path):
+        for command in COMMANDS:
             assert main(words(command)) == 0, command
         found = load_power_parameters("out/press_line_2.yaml")
     assert found.name == "press_line_2"
@@ -63,7 +76,7 @@ def test_the_commands_of_the_page_lead_from_a_programme_to_a_plan(
 
 
 def test_what_a_plant_showed_is_a_trace_with_modes_and_loads(folder: Path) -> None:
-    (trace,) = read_traces(folder / "out" / "excitation" / "run.csv")
+    (trace,) = read_traces(folder / "run.csv")
     assert set(trace.texts["load"]) == {"gripper", "gripper+gear"}
     assert {"STAND_ON_MOTORS", "MOVING", "STAND_ON_BRAKES", "BUS_POWER_OFF"} <= set(
         trace.texts["mode"]
@@ -71,9 +84,9 @@ def test_what_a_plant_showed_is_a_trace_with_modes_and_loads(folder: Path) -> No
     joules = trace.joules()
     assert joules is not None
     assert (np.diff(joules) > 0.0).all()  # there is always a base load
-    steps = yaml.safe_load((folder / "out" / "excitation" / "programme.yaml").read_text())["steps"]
+    steps = yaml.safe_load((folder / "programme.yaml").read_text())["steps"]
     last = [step["trajectory"] for step in steps if "trajectory" in step][-1]
-    end = read_trace(folder / "out" / "excitation" / last, JOINT_NAMES).positions[-1]
+    end = read_trace(folder / last, JOINT_NAMES).positions[-1]
     q = trace.joints(JOINT_NAMES)
     assert q is not None
     np.testing.assert_allclose(q[-1], end, atol=1e-3)  # what the feedback leaves
@@ -96,7 +109,7 @@ def test_a_programme_that_makes_no_sense_is_refused_by_name(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    page = yaml.safe_load((folder / "out" / "excitation" / "programme.yaml").read_text())
+    page = yaml.safe_load((folder / "programme.yaml").read_text())
     step = next(step for step in page["steps"] if key in step)
     step[key] = value
     (tmp_path / "programme.yaml").write_text(yaml.safe_dump({**page, "steps": [step]}))
@@ -107,11 +120,7 @@ def test_a_programme_that_makes_no_sense_is_refused_by_name(
 def test_a_load_that_the_cell_does_not_have_is_no_load_of_a_fit(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    rows = (
-        (folder / "out" / "excitation" / "run.csv")
-        .read_text()
-        .replace(",gripper+gear", ",gripper+anvil")
-    )
+    rows = (folder / "run.csv").read_text().replace(",gripper+gear", ",gripper+anvil")
     (tmp_path / "run.csv").write_text(rows)
     assert main(["energy", "fit", str(tmp_path / "run.csv"), "--cell", "demo"]) != 0
     assert "load 'anvil' is unknown, known are gear, gripper, none" in capsys.readouterr().err
