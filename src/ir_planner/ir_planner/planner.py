@@ -142,17 +142,17 @@ class OptionFields(TypedDict, total=False):
 
 def options_with(options: PlanOptions | None, changes: OptionFields) -> PlanOptions:
     """The options with some fields changed. Raises RequestError: an unknown one, a bad value."""
-    known = [field.name for field in fields(PlanOptions)]
+    names = [field.name for field in fields(PlanOptions)]
     for name in changes:
-        if name not in known:
-            raise unknown_name("option", name, known)
+        if name not in names:
+            raise unknown_name("option", name, names)
     try:
         return PlanOptions(**changes) if options is None else replace(options, **changes)
     except InvalidValueError as error:
         raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, str(error)) from error
     except (TypeError, ValueError, OverflowError) as error:
-        given = ", ".join(f"{name}={value!r}"[:80] for name, value in changes.items())
-        sentence = f"options {given}: one has a value of no fitting type: {error}"
+        shown = ", ".join(f"{name}={value!r}"[:80] for name, value in changes.items())
+        sentence = f"options {shown}: one has a value of no fitting type: {error}"
         raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, sentence) from error
 
 
@@ -524,8 +524,12 @@ class Planner:
         """
         options, note = checked_path_options(options_with(options, changes))
         scene = self.scene(options.load)
-        given = scene.cell.path(path) if isinstance(path, str) else path
-        name, segments = (given.name, given.path) if isinstance(given, CellPath) else ("", given)
+        drawn_path = scene.cell.path(path) if isinstance(path, str) else path
+        name, segments = (
+            (drawn_path.name, drawn_path.path)
+            if isinstance(drawn_path, CellPath)
+            else ("", drawn_path)
+        )
         context = Context.of(scene, options, self._work(options, cancelled), name)
         return self._kept(plan_path(segments, start, t1, context), scene, note)
 
@@ -628,8 +632,8 @@ class Planner:
             own = plan.request
             plan = replace(plan, program=self.kept_program(plan.program, own))
             if plan.run is not None and plan.run_cell is not None:
-                asked = replace(own, cell=plan.run_cell)
-                plan = replace(plan, run=self.kept_program(plan.run, asked))
+                run_request = replace(own, cell=plan.run_cell)
+                plan = replace(plan, run=self.kept_program(plan.run, run_request))
         return replace(plan, info=noted(plan.info, note))
 
     def cycle_request(
@@ -676,13 +680,13 @@ class Planner:
 
     def _places(self, via: Sequence[Place]) -> tuple[Goal, ...]:
         """Places on the way as values. Raises RequestError, which names the place."""
-        found = []
+        places = []
         for k, place in enumerate(via, start=1):
             try:
-                found.append(self._goal(place))
+                places.append(self._goal(place))
             except RequestError as error:
                 raise RequestError(error.code, f"via {k}: {error}") from error
-        return tuple(found)
+        return tuple(places)
 
     def _configuration(self, place: Place | None, what: str, code: StatusCode) -> FloatArray:
         """Joint values (n,) of a posture, a text or an array, None: machine home. Raises
@@ -732,7 +736,7 @@ def _check_pose(goal: Goal) -> None:
 def _tilt_to(goal: Goal, scene: PlanningScene) -> ToolTilt | None:
     """How far the tool may lean on a movement to a goal, by its station and what is held."""
     held = {load.name for load in scene.loads}
-    asked = {f"part {part.name}": part.tilt for part in scene.cell.parts if part.name in held}
+    tilts = {f"part {part.name}": part.tilt for part in scene.cell.parts if part.name in held}
     if goal.station:
-        asked[f"station {goal.station}"] = scene.station(goal.station).tilt
-    return one_tilt(asked, f"the movement to {goal.station or 'the goal'}")
+        tilts[f"station {goal.station}"] = scene.station(goal.station).tilt
+    return one_tilt(tilts, f"the movement to {goal.station or 'the goal'}")

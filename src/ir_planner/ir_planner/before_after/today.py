@@ -83,26 +83,26 @@ def _corners(name: str, run: Sequence[DrivenStep]) -> str:
     """What is changed at the corners of a path whose motions have different ones; "" where nothing
     is.
     """
-    corners = [1e3 * one.corner for one in _drawn(run)[:-1]]
+    corners = [1e3 * motion.corner for motion in _drawn(run)[:-1]]
     if not corners or max(corners) - min(corners) < _SAME_CORNER:
         return ""
-    kept = "exactly" if min(corners) == 0.0 else f"with {min(corners):.3g} mm"
+    corner_text = "exactly" if min(corners) == 0.0 else f"with {min(corners):.3g} mm"
     return (
         f"{name}: its corners are approximated by {min(corners):.3g} to {max(corners):.3g} mm "
-        f"today; a path has one distance for all: the planner's programs drive them {kept}, "
+        f"today; a path has one distance for all: the planner's programs drive them {corner_text}, "
         "which takes them longer"
     )
 
 
 def _drawn(run: Sequence[DrivenStep]) -> list[ToolMotion]:
-    return [one for step in run for one in step.tool if one is not None]
+    return [path for step in run for path in step.tool if path is not None]
 
 
 def same_poses(first: CartesianPath, second: CartesianPath) -> bool:
     """Whether two paths have the same segments through the same poses."""
-    kinds = [[one.kind for one in path.segments] for path in (first, second)]
+    kinds = [[segment.kind for segment in path.segments] for path in (first, second)]
     poses = [
-        [path.start, *(pose for one in path.segments for pose in one.poses)]
+        [path.start, *(pose for segment in path.segments for pose in segment.poses)]
         for path in (first, second)
     ]
     if kinds[0] != kinds[1] or len(poses[0]) != len(poses[1]):
@@ -154,8 +154,10 @@ def _worked(step: DrivenStep, lines: Lines | None) -> tuple[SourcePlace, ...]:
 
 def _may_work(step: DrivenStep) -> bool:
     """Whether more than a straight line of the tool is driven through: perhaps a process."""
-    drawn = [one for one in step.tool if one is not None]
-    return len(drawn) > 1 or any(segment.kind != LINE for one in drawn for segment in one.segments)
+    drawn = [path for path in step.tool if path is not None]
+    return len(drawn) > 1 or any(
+        segment.kind != LINE for path in drawn for segment in path.segments
+    )
 
 
 def _check_alone(step: DrivenStep, worked: tuple[SourcePlace, ...]) -> None:
@@ -287,24 +289,26 @@ def today_of_krl(found: EvaluatedProgram, process: Lines | None = None) -> Today
     off, (): none. Raises RequestError for a program that doesn't move and for a process that
     can't be asked for as paths of the tool.
     """
-    if not any(one.step.moves for one in found.steps):
+    if not any(motion.step.moves for motion in found.steps):
         raise nothing_moves(found.name)
-    paths = process_paths([one.step for one in found.steps], process)
-    loads, carried = _loads([one.step for one in found.steps])
+    paths = process_paths([motion.step for motion in found.steps], process)
+    loads, carried = _loads([motion.step for motion in found.steps])
     stretches = tuple(
-        replace(_stretch(one, path), load=load)
-        for one, path, load in zip(found.steps, paths, carried, strict=True)
+        replace(_stretch(motion, path), load=load)
+        for motion, path, load in zip(found.steps, paths, carried, strict=True)
     )
     start = np.asarray(found.steps[0].step.trajectory.positions[0])
     notes = [str(note) for note in found.notes]
     waits = [
-        one for one in found.steps if one.step.waits_for and PLC_DONE not in one.step.waits_for
+        motion
+        for motion in found.steps
+        if motion.step.waits_for and PLC_DONE not in motion.step.waits_for
     ]
     if waits:
         notes.append(
             f"{len(waits)} waits for machines count no time: how long they take is not in a program"
         )
-    notes += process_notes([one.step for one in found.steps], paths)
+    notes += process_notes([motion.step for motion in found.steps], paths)
     if loads:
         notes.append(
             "every program of this comparison carries what $LOAD says, movement by movement: "
@@ -317,22 +321,22 @@ def _loads(steps: Sequence[DrivenStep]) -> tuple[tuple[Load, ...], list[str]]:
     """What a program carries, and which of it in each step, where $LOAD says it anywhere."""
     if not any(map(is_named, (load for step in steps for load in step.scene.loads))):
         return (), [""] * len(steps)
-    found: list[Load] = []
+    loads: list[Load] = []
     carried = []
     for step in steps:
         load = whole_load(step.scene.loads, step.places[0])
-        same = next((one for one in found if _same_load(one, load)), None)
+        same = next((load_before for load_before in loads if _same_load(load_before, load)), None)
         if same is None:
-            name = LOAD_NAME if not found else f"{LOAD_NAME}_{len(found) + 1}"
+            name = LOAD_NAME if not loads else f"{LOAD_NAME}_{len(loads) + 1}"
             same = replace(load, name=name)
-            found.append(same)
+            loads.append(same)
         carried.append(same.name)
-    return tuple(found), carried
+    return tuple(loads), carried
 
 
 def _same_load(a: Load, b: Load) -> bool:
-    names = [[capsule.name for capsule in one.capsules] for one in (a, b)]
-    figures = [np.concatenate([[one.mass], one.com, one.inertia.ravel()]) for one in (a, b)]
+    names = [[capsule.name for capsule in load.capsules] for load in (a, b)]
+    figures = [np.concatenate([[load.mass], load.com, load.inertia.ravel()]) for load in (a, b)]
     return names[0] == names[1] and np.array_equal(figures[0], figures[1])
 
 

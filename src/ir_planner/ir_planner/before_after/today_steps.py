@@ -61,30 +61,30 @@ def asked_program(today: Today, scene: PlanningScene) -> AskedProgram:
     steps: list[StepToday] = []
     moves: list[TodayMotion] = []
     last = len(today.stretches) - 1
-    for k, one in enumerate(today.stretches):
-        if one.trajectory is not None:
-            moves.append(one)
+    for k, stretch in enumerate(today.stretches):
+        if stretch.trajectory is not None:
+            moves.append(stretch)
             after = today.stretches[k + 1] if k < last else None
-            if one.process is not None:
-                if after is None or after.process is not one.process:
+            if stretch.process is not None:
+                if after is None or after.process is not stretch.process:
                     steps.append(
-                        StepToday(ProgramStep("PATH", stops.path(one.process)), tuple(moves))
+                        StepToday(ProgramStep("PATH", stops.path(stretch.process)), tuple(moves))
                     )
                     moves = []
                 continue
             if after is not None and after.process is not None:
                 continue  # the beginning of a path is no stop of its own
             waits = after is not None and after.trajectory is None
-            waits = waits or (after is not None and after.load != one.load)
-            name = stops.name(one.q, needed=one.works or waits or k == last)
+            waits = waits or (after is not None and after.load != stretch.load)
+            name = stops.name(stretch.q, needed=stretch.works or waits or k == last)
             if name:
                 steps.append(StepToday(stops.step(name), tuple(moves)))
                 moves = []
-        elif one.seconds > 0.0:
-            pause = ProgramStep("PAUSE", dwell=one.seconds, power_mode=AUTO)
-            steps.append(StepToday(pause, (one,)))
+        elif stretch.seconds > 0.0:
+            pause = ProgramStep("PAUSE", dwell=stretch.seconds, power_mode=AUTO)
+            steps.append(StepToday(pause, (stretch,)))
         elif steps:  # a standstill of no time: what is done in it belongs to the stop
-            steps[-1] = replace(steps[-1], stretches=(*steps[-1].stretches, one))
+            steps[-1] = replace(steps[-1], stretches=(*steps[-1].stretches, stretch))
     if not any(step.step.kind != "PAUSE" for step in steps):
         raise nothing_moves(today.name)
     steps, notes = _at_stops(steps, today, scene)
@@ -99,9 +99,9 @@ def _at_stops(
     """The steps with parts and signals: the program's own, else the cell's where it makes the same
     stops.
     """
-    if any(one.handled or one.signals or one.awaited for one in today.stretches):
-        said = "parts and signals at the stops are those of the program's own outputs and waits"
-        return _with_signals(steps), [said]
+    if any(stretch.handled or stretch.signals or stretch.awaited for stretch in today.stretches):
+        note = "parts and signals at the stops are those of the program's own outputs and waits"
+        return _with_signals(steps), [note]
     return _handled(steps, scene.cell, posture_at(scene, today.start))
 
 
@@ -119,12 +119,12 @@ def _carried(steps: list[StepToday], today: Today) -> list[StepToday]:
         return steps
     now = today.loads[0].name
     result = []
-    for k, one in enumerate(steps):
-        following = (stretch for each in steps[k + 1 :] for stretch in each.stretches)
+    for k, step_today in enumerate(steps):
+        following = (stretch for later in steps[k + 1 :] for stretch in later.stretches)
         carries = next((stretch.load for stretch in following), now)
         changes = carries != now
-        step = replace(one.step, carries=carries) if changes else one.step
-        result.append(replace(one, step=step))
+        step = replace(step_today.step, carries=carries) if changes else step_today.step
+        result.append(replace(step_today, step=step))
         now = carries
     return result
 
@@ -137,22 +137,22 @@ def _with_signals(steps: list[StepToday]) -> list[StepToday]:
     result: list[StepToday] = []
     awaited: list[Signal] = []
     at = ProgramStep("POSTURE", "home")
-    for asked in steps:
-        done = asked.stretches
-        waits = tuple(signal for one in done for signal in one.awaited)
-        signals = tuple(signal for one in done for signal in one.signals)
-        handled, *more = [one.handled for one in done if one.handled] or [""]
-        if asked.step.kind == "PAUSE":
+    for step in steps:
+        done = step.stretches
+        waits = tuple(signal for stretch in done for signal in stretch.awaited)
+        signals = tuple(signal for stretch in done for signal in stretch.signals)
+        handled, *more = [stretch.handled for stretch in done if stretch.handled] or [""]
+        if step.step.kind == "PAUSE":
             awaited += waits
-            result.append(replace(asked, step=replace(asked.step, set_signals=signals)))
+            result.append(replace(step, step=replace(step.step, set_signals=signals)))
             more = [handled, *more]
         else:
-            at = asked.step
+            at = step.step
             there = replace(at, wait_for=(*awaited, *waits), set_signals=signals)
             awaited = []
-            result.append(replace(asked, step=_handling(there, handled)))
+            result.append(replace(step, step=_handling(there, handled)))
         result += [
-            StepToday(_handling(at, one), ()) for one in more if one and at.kind == "STATION"
+            StepToday(_handling(at, part), ()) for part in more if part and at.kind == "STATION"
         ]
     return result
 
@@ -170,15 +170,15 @@ def _handled(steps: list[StepToday], cell: Cell, start: str) -> tuple[list[StepT
     """The steps with what the cell's program handles at its stops, where it makes the same ones; a
     program that only begins in the posture `start` begins where today's does.
     """
-    own = [step for step in cell.program if step.kind != "PAUSE"]
-    if own and own[0] == ProgramStep("POSTURE", start):
-        own = own[1:]
+    program_steps = [step for step in cell.program if step.kind != "PAUSE"]
+    if program_steps and program_steps[0] == ProgramStep("POSTURE", start):
+        program_steps = program_steps[1:]
     stopping = [step.step for step in steps if step.step.kind != "PAUSE"]
-    if not own or [s.target for s in own] != [s.target for s in stopping]:
+    if not program_steps or [s.target for s in program_steps] != [s.target for s in stopping]:
         held = cell.tool.name if cell.tool is not None else "nothing"
-        handles = any(step.attach or step.detach for step in own)
+        handles = any(step.attach or step.detach for step in program_steps)
         return steps, [f"what is held all along: {held}"] if handles else []
-    handling = iter(own)
+    handling = iter(program_steps)
     result = []
     for step in steps:
         if step.step.kind == "PAUSE":
@@ -198,12 +198,12 @@ class _Stops:
 
     def name(self, q: FloatArray, needed: bool) -> str:
         """Of the stop at q (n,); "" where there is none and none is needed."""
-        found = station_at(self._scene, q) or posture_at(self._scene, q)
-        if found or not needed:
-            return found
+        place = station_at(self._scene, q) or posture_at(self._scene, q)
+        if place or not needed:
+            return place
         pose = self._scene.chain.tcp_poses(q[None])[0]
-        for name, known in self._added:
-            if np.abs(known - pose).max() < 2e-3:
+        for name, configuration in self._added:
+            if np.abs(configuration - pose).max() < 2e-3:
                 return name
         taken = {station.name for station in self._scene.cell.stations}
         taken |= set(dict(self._added))
@@ -213,11 +213,11 @@ class _Stops:
 
     def path(self, driven: CellPath) -> str:
         """Of the path that today's program drives: the cell's own where it has the same poses."""
-        own = next(
-            (one for one in self._scene.cell.paths if same_poses(one.path, driven.path)), None
+        same = next(
+            (path for path in self._scene.cell.paths if same_poses(path.path, driven.path)), None
         )
-        named = driven if own is None else driven_as(own, driven)
-        taken = {one.name for one in self._paths}
+        named = driven if same is None else driven_as(same, driven)
+        taken = {path.name for path in self._paths}
         if named.name in taken:  # the cell's own once more: perhaps at another speed
             named = replace(named, name=driven.name)
         self._paths.append(named)
@@ -233,8 +233,8 @@ class _Stops:
     def cell(self) -> Cell:
         """The cell with the added stations."""
         cell = self._scene.cell
-        driven = {one.name for one in self._paths}
-        paths = (*(one for one in cell.paths if one.name not in driven), *self._paths)
+        driven = {path.name for path in self._paths}
+        paths = (*(path for path in cell.paths if path.name not in driven), *self._paths)
         if self._paths:
             cell = replace(cell, paths=paths, program=())
         if not self._added:
@@ -265,10 +265,10 @@ def freed_rests(cell: Cell, asked: AskedProgram) -> tuple[str, ...]:
             fixed.setdefault(mode, []).append(f"{step.dwell:g}")
     if not fixed:
         return ()
-    said = "; ".join(f"{mode} ({', '.join(dict.fromkeys(s))} s)" for mode, s in fixed.items())
+    rests = "; ".join(f"{mode} ({', '.join(dict.fromkeys(s))} s)" for mode, s in fixed.items())
     return (
         "the planner's programs spend every pause in the modes of least energy; the cell's own "
-        f"program fixes the mode of some, which is freed here: {said}",
+        f"program fixes the mode of some, which is freed here: {rests}",
     )
 
 
@@ -319,7 +319,7 @@ class _Costing:
         along = stretch.process is not None
         names = [there] if along else [station.name for station in scene.cell.stations]
         contacts = tuple(dict.fromkeys(name for name in (here, there) if name in names))
-        found = evaluate_trajectory(
+        evaluated = evaluate_trajectory(
             stretch.trajectory,
             scene,
             self._request.options.safety_distance,
@@ -332,11 +332,11 @@ class _Costing:
             to_station=there,
             trajectory_id=stretch.trajectory.trajectory_id,
             trajectory=stretch.trajectory,
-            report=found.report,
+            report=evaluated.report,
             duration=stretch.trajectory.duration,
             load=scene.load_text,
         )
-        self.steps.append(self._charge.moved(step, found.energy, scene))
+        self.steps.append(self._charge.moved(step, evaluated.energy, scene))
         self._q = stretch.q
 
     def pause(self, stretch: TodayMotion, here: str, scene: PlanningScene) -> None:
@@ -361,7 +361,7 @@ def doors_at_the_start(
     """
     if today.doors is None:
         return (), assumed_doors(cell)
-    recorded = {one.doors for one in today.stretches}
+    recorded = {stretch.doors for stretch in today.stretches}
     signals = {machine.switch.signal for machine in cell.equipment if machine.switch is not None}
     moved = {signal.name for step in asked.steps for signal in step.step.set_signals}
     if len(recorded) > 1 and not signals & moved:

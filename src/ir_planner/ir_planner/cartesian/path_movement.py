@@ -71,14 +71,14 @@ def best_along(asked: ToolPathRequest, layers: Layers) -> DrivenPath:
         if best is not None and trial.least_duration >= best.movement.trajectory.duration:
             break
         try:
-            found = _best_at(trial, layers)
+            driven = _best_at(trial, layers)
         except PathRefusedError as error:
             if error.code != StatusCode.INVALID_MOTION_PLAN:
                 raise
             reason = reason or error
             continue
-        if best is None or _duration(found) < _duration(best):
-            best = found
+        if best is None or _duration(driven) < _duration(best):
+            best = driven
     if best is None:
         assert reason is not None  # of the first rate
         raise reason
@@ -128,14 +128,14 @@ def _best_at(asked: ToolPathRequest, layers: Layers) -> DrivenPath:
         except PathRefusedError as error:
             raise reason or error from error
         with journal.stage("proof") as notes:
-            for one in sorted(driven, key=lambda one: one.movement.coarse_cost):
-                one = farther_from_limits(asked, one)
-                violation = one.movement.prove().violation
+            for candidate in sorted(driven, key=lambda candidate: candidate.movement.coarse_cost):
+                candidate = farther_from_limits(asked, candidate)
+                violation = candidate.movement.prove().violation
                 if violation is None:
-                    return one
+                    return candidate
                 notes.append(violation.sentence)
-                reason = reason or _uncertified(one)
-                layers = _without(layers, one)
+                reason = reason or _uncertified(candidate)
+                layers = _without(layers, candidate)
     assert reason is not None  # of the first round
     raise reason
 
@@ -149,10 +149,10 @@ def _driven_chains(asked: ToolPathRequest, layers: Layers) -> tuple[list[DrivenP
     journal = asked.context.journal
     for _ in range(_CLOSER):
         with journal.stage("search") as notes:
-            found, layers = chains_through(asked, layers, _TRIED)
-            notes.append(f"{len(found)} chains")
+            chains, layers = chains_through(asked, layers, _TRIED)
+            notes.append(f"{len(chains)} chains")
         with journal.stage("timing") as notes:
-            driven, reasons = _driven(asked, found)
+            driven, reasons = _driven(asked, chains)
             notes.append(f"{len(driven)} within the limits")
         if driven:
             return driven, layers
@@ -199,7 +199,7 @@ def _worth(chain: ConfigurationChain, driven: list[DrivenPath], objective: str) 
     """Whether a chain may be cheaper than those that are driven. One of the same joules is their
     mirror image with the wrist turned over; where joules decide, those that cost far more lose.
     """
-    known = [one.chain.joules for one in driven]
+    known = [path.chain.joules for path in driven]
     if any(abs(chain.joules - joules) <= _SAME * joules for joules in known):
         return False
     by_joules = objective in ("time_and_energy", "energy")
@@ -260,7 +260,7 @@ def timed(
     curves = [curve_of(whole, chain, angle, (whole.ends[a], whole.ends[b]), scene) for a, b in ends]
     slower = _flange_share(asked, curves) if asked.t1 else 1.0
     along = [_spans(whole, a, b, slower * asked.rate) for a, b in ends]
-    made: list[DrivenPath] = []
+    paths: list[DrivenPath] = []
 
     def within(limits: MotionLimits) -> Movement:
         limits = limits.scaled(share, share)
@@ -275,11 +275,11 @@ def timed(
         if path.speed_tolerance >= 1.0:
             points = _as_slow_as_sent(points, limits, scene)
         movement = Movement(chain.q, points.trajectory, asked.context, fixed_time=True)
-        made.append(DrivenPath(movement, points, angle, chain, slower, longer))
+        paths.append(DrivenPath(movement, points, angle, chain, slower, longer))
         return movement
 
     within_torque(within, asked.context)
-    return made[-1]
+    return paths[-1]
 
 
 def _as_slow_as_sent(path: SentPath, limits: MotionLimits, scene: PlanningScene) -> SentPath:
@@ -336,7 +336,7 @@ def _flange_share(asked: ToolPathRequest, curves: list[JointCurve]) -> float:
     """What share of the speed keeps the centre of the flange at T1's speed too."""
     path = asked.path
     context = asked.context
-    linear = max([path.tool_speed, *(one.tool_speed for one in path.segments)])
+    linear = max([path.tool_speed, *(segment.tool_speed for segment in path.segments)])
     fastest = 0.0
     for curve, (first_part, _) in zip(curves, asked.whole.strokes, strict=True):
         part = asked.whole.parts[first_part]

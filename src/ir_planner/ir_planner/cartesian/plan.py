@@ -97,22 +97,24 @@ class Drawn:
 
     def kept(self, driven: DrivenPath) -> PathAccuracy:
         """What a movement keeps of the path. Raises PathRefusedError where that isn't enough."""
-        found = kept_of(driven.sent, self.asked.whole, driven.angle, self.asked.context.scene)
+        tolerances = kept_of(driven.sent, self.asked.whole, driven.angle, self.asked.context.scene)
         leaves = max((joint.leaves for joint in self.joints), default=0.0)
         turns = max((joint.turns for joint in self.joints), default=0.0)
         share = min(driven.top_speed / (driven.slower * self.asked.fastest), 1.0)
-        found = replace(
-            found,
-            tool_error=found.tool_error + leaves,
-            rotation_error=found.rotation_error + turns,
-            speed_deviation=max(found.speed_deviation, 1.0 - (1.0 - found.speed_deviation) * share),
+        tolerances = replace(
+            tolerances,
+            tool_error=tolerances.tool_error + leaves,
+            rotation_error=tolerances.rotation_error + turns,
+            speed_deviation=max(
+                tolerances.speed_deviation, 1.0 - (1.0 - tolerances.speed_deviation) * share
+            ),
         )
-        if found.tool_error > TOOL_ERROR_MAX:
+        if tolerances.tool_error > TOOL_ERROR_MAX:
             raise PathRefusedError(
                 f"the tool can't be shown to keep within {TOOL_ERROR_MAX * 1e3:g} mm of the path: "
-                f"{found.tool_error * 1e3:.3g} mm"
+                f"{tolerances.tool_error * 1e3:.3g} mm"
             )
-        return found
+        return tolerances
 
 
 def drawn(path: CartesianPath, start: FloatArray | None, t1: bool, context: Context) -> Drawn:
@@ -126,18 +128,20 @@ def drawn(path: CartesianPath, start: FloatArray | None, t1: bool, context: Cont
         notes.append(f"{whole.length:.3f} m in {len(whole.parts)} parts")
         if (reduced := _reduced(path, whole, joints)) < path.blending_radius:
             notes.append(f"blending radius down to {reduced:.4g} m: half of a part")
-    asked = ToolPathRequest(path, whole, start is not None, t1, context)
+    request = ToolPathRequest(path, whole, start is not None, t1, context)
     with context.journal.stage("configurations") as notes:
-        layers = layers_of(whole, path.free_angle, asked.space, start)
+        layers = layers_of(whole, path.free_angle, request.space, start)
         notes.append(f"{len(layers.q)} at {len(layers.s)} samples, {int(layers.free.sum())} free")
-    return Drawn(asked, joints, layers)
+    return Drawn(request, joints, layers)
 
 
 _BELOW = 0.998  # of the tool's largest speed: by how much the tool may be off the speed asked for
 
 
 def _at_most(path: CartesianPath, speed: float) -> CartesianPath:
-    segments = tuple(replace(one, tool_speed=min(one.tool_speed, speed)) for one in path.segments)
+    segments = tuple(
+        replace(segment, tool_speed=min(segment.tool_speed, speed)) for segment in path.segments
+    )
     return replace(path, tool_speed=min(path.tool_speed, speed), segments=segments)
 
 
@@ -204,20 +208,20 @@ def choices_along(
     whole = drawn(path, None, False, context)
     whole = replace(whole, layers=replace(whole.layers, free=_ends_free(whole, after)))
     reason: PathRefusedError | None = None
-    found: list[DrivenPath] = []
+    paths: list[DrivenPath] = []
     for chain in _different(whole):
         context.work.check()
         try:
             driven = farther_from_limits(whole.asked, timed(whole.asked, chain))
             if driven.movement.prove().certified:
                 whole.kept(driven)
-                found.append(driven)
+                paths.append(driven)
         except PathRefusedError as error:
             reason = reason or error
-    if not found:
-        found = [best_along(whole.asked, whole.layers)]
-        whole.kept(found[0])
-    turned = (choice for driven in found for choice in _turned(driven))
+    if not paths:
+        paths = [best_along(whole.asked, whole.layers)]
+        whole.kept(paths[0])
+    turned = (choice for driven in paths for choice in _turned(driven))
     return list(itertools.islice(turned, most))
 
 
@@ -244,17 +248,17 @@ def _ends_free(whole: Drawn, after: FreeSpace) -> BoolArray:
 
 def _different(whole: Drawn) -> list[ConfigurationChain]:
     """The cheapest chains by their ends and by their starts, each once, cheapest first."""
-    asked = whole.asked
+    request = whole.asked
     layers = whole.layers
-    by_end, layers = chains_through(asked, layers, _OF_EACH)
-    by_start, _ = chains_through(asked, layers, _OF_EACH, by_start=True)
-    kept: list[ConfigurationChain] = []
-    for chain in sorted((*by_end, *by_start), key=lambda one: one.joules):
+    by_end, layers = chains_through(request, layers, _OF_EACH)
+    by_start, _ = chains_through(request, layers, _OF_EACH, by_start=True)
+    chains: list[ConfigurationChain] = []
+    for chain in sorted((*by_end, *by_start), key=lambda path: path.joules):
         if all(
-            np.abs(portable.sin(0.5 * (chain.q - other.q))).max() > 0.5 * _SAME for other in kept
+            np.abs(portable.sin(0.5 * (chain.q - other.q))).max() > 0.5 * _SAME for other in chains
         ):
-            kept.append(chain)
-    return kept
+            chains.append(chain)
+    return chains
 
 
 def _turned(driven: DrivenPath) -> Iterator[ChosenMovement]:
@@ -269,12 +273,12 @@ def _turned(driven: DrivenPath) -> Iterator[ChosenMovement]:
         [k for k in _TURNS if a + 2.0 * np.pi * k >= least and b + 2.0 * np.pi * k <= most]
         for a, b, least, most in zip(low, high, robot.position_min, robot.position_max, strict=True)
     ]
-    own = trajectory.positions
+    positions = trajectory.positions
     for shift in sorted(itertools.product(*turns), key=lambda one: sum(map(abs, one))):
         if not any(shift):
-            yield ChosenMovement(own, movement)
+            yield ChosenMovement(positions, movement)
             continue
-        moved = own + 2.0 * np.pi * np.array(shift)
+        moved = positions + 2.0 * np.pi * np.array(shift)
         yield ChosenMovement(
             moved, replace(movement, trajectory=replace(trajectory, positions=moved))
         )
@@ -298,19 +302,19 @@ def remarks(drawn: ToolPathRequest, found: DrivenPath) -> Iterator[tuple[str, st
         yield "t1", f"{found.slower * path.tool_speed:.4g} m/s, so that the flange keeps 250 mm/s"
     if found.longer:
         yield "speed", f"the axes need long ramps: the tool keeps its speed {_kept_between(found)}"
-    asked = found.slower * max(part.tool_speed or path.tool_speed for part in path.segments)
-    top = found.top_speed if len(moving) == len(found.sent.strokes) else asked
+    fastest = found.slower * max(part.tool_speed or path.tool_speed for part in path.segments)
+    top = found.top_speed if len(moving) == len(found.sent.strokes) else fastest
     slowed = [stroke for stroke in moving if stroke.slowness is not None]
     if path.speed_tolerance >= 1.0 and slowed:
         mean = sum(s.curve.end - s.curve.begin for s in moving) / sum(s.duration for s in moving)
         yield (
             "speed",
-            f"slower than {asked:.4g} m/s where the axes need it: {mean:.4g} m/s in the mean",
+            f"slower than {fastest:.4g} m/s where the axes need it: {mean:.4g} m/s in the mean",
         )
-    elif top < _REACHED * asked:
+    elif top < _REACHED * fastest:
         yield (
             "speed",
-            f"the path is too short for {asked:.4g} m/s: the tool moves at {top:.4g} m/s at most",
+            f"the path is too short for {fastest:.4g} m/s: the tool moves at {top:.4g} m/s at most",
         )
 
 
@@ -358,21 +362,21 @@ def _planned(
         cell = context.scene.cell
         start = within_limits(start, cell, "start", StatusCode.START_STATE_INVALID)
     whole = drawn(path, start, t1, context)
-    found = best_along(whole.asked, whole.layers)
+    driven = best_along(whole.asked, whole.layers)
     with context.journal.stage("tool error"):
-        kept = whole.kept(found)
-    for name, text in remarks(whole.asked, found):
+        accuracy = whole.kept(driven)
+    for name, text in remarks(whole.asked, driven):
         context.journal.note(name, text)
-    trajectory = found.movement.trajectory
+    trajectory = driven.movement.trajectory
     info = context.journal.info(trajectory.positions[0], context.joint_names)
     return CartesianPlan(
         Status.success(),
         info,
-        found.movement.report,
+        driven.movement.report,
         trajectory,
-        kept.tool_error,
-        kept.rotation_error,
-        kept.speed_deviation,
+        accuracy.tool_error,
+        accuracy.rotation_error,
+        accuracy.speed_deviation,
         whole.lengths,
         len(whole.layers.q),
     )

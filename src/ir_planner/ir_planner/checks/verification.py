@@ -182,13 +182,13 @@ def share_violation(
 def tool_violation(use: ToolUse) -> Violation | None:
     """Where the tool is faster than it may be, or can't be proved to be slower."""
     first: Violation | None = None
-    for name, found, bounds in use.asked:
+    for name, value, bounds in use.asked:
         for what, most, sampled, limit, unit in (
-            ("speed", found.speed, found.found_speed, bounds.speed, "m/s"),
+            ("speed", value.speed, value.found_speed, bounds.speed, "m/s"),
             (
                 "acceleration",
-                found.acceleration,
-                found.found_acceleration,
+                value.acceleration,
+                value.found_acceleration,
                 bounds.acceleration,
                 "m/s^2",
             ),
@@ -241,19 +241,19 @@ def _of_hop(
     """What is wrong between several stations: the trajectory is cut where the tcp leaves or enters
     a zone; between two cuts the contacts of those stations hold whose zone it is in.
     """
-    outside = {one: spans_outside(trajectory, scene, one, margin) for one in stations}
+    outside = {station: spans_outside(trajectory, scene, station, margin) for station in stations}
     cuts = {float(trajectory.times[0]), float(trajectory.times[-1])}
     cuts |= {at for spans in outside.values() for span in spans for at in span}
-    found = []
+    spans_of_hop = []
     for begin, end in pairwise(sorted(cuts)):
         there = tuple(
-            one
-            for one, spans in outside.items()
+            station
+            for station, spans in outside.items()
             if not any(left <= begin and end <= right for left, right in spans)
         )
         threshold = scene.thresholds(margin, there) - PROOF_TOLERANCE
-        found.append(_of_part(trajectory, (begin, end), threshold, scene, there))
-    return found
+        spans_of_hop.append(_of_part(trajectory, (begin, end), threshold, scene, there))
+    return spans_of_hop
 
 
 def _first(found: Sequence[Violation | None]) -> Violation | None:
@@ -271,13 +271,20 @@ def _of_part(
     coefficients, durations = polynomials_between(trajectory, *span)
     if len(durations) == 0:
         return None
-    found = scene.collision.certify_trajectory(coefficients, durations, threshold)
-    if found.verdict == FREE:
+    certificate = scene.collision.certify_trajectory(coefficients, durations, threshold)
+    if certificate.verdict == FREE:
         return None
-    first, last = (span[0] + t for t in found.interval)
+    first, last = (span[0] + t for t in certificate.interval)
     q = trajectory.sample([last]).q[0]
     return _violation(
-        trajectory, q, (first, last), found.verdict, found.pair, threshold, scene, station
+        trajectory,
+        q,
+        (first, last),
+        certificate.verdict,
+        certificate.pair,
+        threshold,
+        scene,
+        station,
     )
 
 
@@ -309,10 +316,10 @@ def _violation(
     station: Stops,
 ) -> Violation:
     pair = pair_value(scene, q, z, bool(scene.own_distance(station)[z]))
-    kept = float(threshold[z]) + PROOF_TOLERANCE
-    excess = kept - pair.distance
+    needed = float(threshold[z]) + PROOF_TOLERANCE
+    excess = needed - pair.distance
     k = segment_at(trajectory, interval[1])
-    distance, bound = in_mm(pair.distance, kept)
+    distance, bound = in_mm(pair.distance, needed)
     come = "come to" if verdict == COLLIDES else "can't be proved to stay apart, they are at"
     sentence = (
         f"{pair.body_a} and {pair.body_b} ({pair.kind}) {come} {distance} mm "
@@ -334,11 +341,11 @@ def tilt_violation(trajectory: JointTrajectory, cone: ToolCone | None) -> Violat
     if len(durations) == 0:
         coefficients = trajectory.positions[:, :, None]
         durations = np.zeros(1)
-    found = cone.proof(coefficients, durations)
-    if found.ok.all():
+    proof = cone.proof(coefficients, durations)
+    if proof.ok.all():
         return None
-    k = int(np.argmin(found.ok))
-    time = float(trajectory.times[0] + durations[:k].sum() + found.time[k])
+    k = int(np.argmin(proof.ok))
+    time = float(trajectory.times[0] + durations[:k].sum() + proof.time[k])
     tilt = float(cone.tilts(trajectory.sample([time]).q)[0])
     sentence = leans(tilt, cone, f"at {time:.3f} s")
     return Violation(time, segment_at(trajectory, time), TILT, tilt - cone.most, sentence)

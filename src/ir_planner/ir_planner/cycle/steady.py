@@ -366,11 +366,11 @@ class _Model:
         """
         busiest = 0.0
         for machine, process in enumerate(self.problem.process):
-            own = process / self.problem.capacity[machine]
+            busy = process / self.problem.capacity[machine]
             if self.problem.places[machine] == 1:
-                own += sum(self._shortest(a) for a in (machine, machine + 1))
-                own += self._travel[machine + 1, machine]
-            busiest = max(busiest, own)
+                busy += sum(self._shortest(a) for a in (machine, machine + 1))
+                busy += self._travel[machine + 1, machine]
+            busiest = max(busiest, busy)
         return self.units * busiest
 
     def _shortest(self, activity: int) -> float:
@@ -471,17 +471,17 @@ class _Model:
 
     def _modes(self, modes: Sequence[WaitMode]) -> list[tuple[WaitMode, int, int]]:
         """Each mode with its choice and its seconds; at most one is chosen."""
-        found = []
+        waits = []
         for mode in modes:
             chosen = self.program.binary(cost=self.price * mode.joules)
             longest = min(mode.longest, self.most)
             seconds = self.program.variable(0.0, longest, cost=self.price * mode.watts)
             self.program.row({seconds: 1.0, chosen: -longest}, high=0.0)
             self.program.row({seconds: 1.0, chosen: -mode.shortest}, low=0.0)
-            found.append((mode, chosen, seconds))
-        if len(found) > 1:
-            self.program.row({chosen: 1.0 for _, chosen, _ in found}, high=1.0)
-        return found
+            waits.append((mode, chosen, seconds))
+        if len(waits) > 1:
+            self.program.row({chosen: 1.0 for _, chosen, _ in waits}, high=1.0)
+        return waits
 
     def _successors(self) -> None:
         """Every activity is followed by one other."""

@@ -60,20 +60,20 @@ def process_motions(commands: Sequence[Command]) -> frozenset[int]:
     only the tool is led meanwhile (LIN, CIRC, SPLINE and their relatives; waits don't matter). A
     PTP ends it: what is switched around one is a gripper or a message. A pulse switches nothing.
     """
-    found: set[int] = set()
+    numbers: set[int] = set()
     since: dict[int, set[int]] = {}  # by output: motions since it was switched on
     for k, command in enumerate(commands):
         match command:
             case SetOutput(value=True, pulse=0.0):
                 since.setdefault(command.number, set())
             case SetOutput(value=False):
-                found |= since.pop(command.number, set())
+                numbers |= since.pop(command.number, set())
             case Motion(kind="ptp") | SplineBlock(axis=True):
                 since.clear()
             case Motion() | SplineBlock():
                 for motions in since.values():
                     motions.add(k)
-    return frozenset(found)
+    return frozenset(numbers)
 
 
 def _target_of(command: Motion | SplineBlock) -> Target:
@@ -145,17 +145,17 @@ def drive(
 
 def _triggered(commands: Sequence[Command]) -> dict[int, list[SetOutput]]:
     """What triggers set, by the place of their motion in `commands`."""
-    found: dict[int, list[SetOutput]] = {}
+    outputs: dict[int, list[SetOutput]] = {}
     waiting: list[SetOutput] = []
     last = -1
     for k, command in enumerate(commands):
         if isinstance(command, Motion | SplineBlock):
-            found[k] = waiting
+            outputs[k] = waiting
             waiting = []
             last = k
         elif isinstance(command, SetOutput) and command.switch is not None:
-            (waiting if command.switch.ahead or last < 0 else found[last]).append(command)
-    return found
+            (waiting if command.switch.ahead or last < 0 else outputs[last]).append(command)
+    return outputs
 
 
 class _Event(NamedTuple):
@@ -266,7 +266,7 @@ class _Drive:
         if not self._through:
             return
         through = self._through
-        moves = [one.move for one in through]
+        moves = [part.move for part in through]
         driven = trajectory(moves, self._overlaps, self.scene.cell.robot.joint_names)
         events = self._events(driven, stages_of(moves, self._overlaps))
         self._through = []
@@ -277,11 +277,11 @@ class _Drive:
         self._carry(_payload_of(through[0].command), through[0].command.place)
         self._step(
             driven,
-            tuple(one.command.place for one in through),
+            tuple(part.command.place for part in through),
             events,
             moves=True,
-            tool=tuple(one.drawn for one in through),
-            process=tuple(one.command.place for one in through if one.working),
+            tool=tuple(part.drawn for part in through),
+            process=tuple(part.command.place for part in through if part.working),
         )
         for output in outputs:
             self._set(output)
@@ -290,13 +290,13 @@ class _Drive:
         self, driven: JointTrajectory, stages: Sequence[Sequence[MotionPhase]]
     ) -> list[_Event]:
         """What happens while a movement is driven."""
-        found = []
-        for one, parts in zip(self._through, stages, strict=True):
-            if one is not self._through[0]:
+        events = []
+        for part, parts in zip(self._through, stages, strict=True):
+            if part is not self._through[0]:
                 rounded = 0.5 * (parts[0].earliest + parts[0].free)
-                found.append(_Event(rounded, _first_part(one.command)))
-            found += self._triggers(driven, one.command, parts, one.triggered)
-        return found
+                events.append(_Event(rounded, _first_part(part.command)))
+            events += self._triggers(driven, part.command, parts, part.triggered)
+        return events
 
     def _triggers(
         self,
@@ -309,18 +309,18 @@ class _Drive:
         if not triggered:
             return []
         shifted = along_path(driven, _target_of(command), self.arm)
-        found = []
-        for one in triggered:
-            assert one.switch is not None  # as triggers have
-            at, limited = instant(one.switch, stages[one.switch.part], shifted)
-            found.append(_Event(at, one))
+        events = []
+        for trigger in triggered:
+            assert trigger.switch is not None  # as triggers have
+            at, limited = instant(trigger.switch, stages[trigger.switch.part], shifted)
+            events.append(_Event(at, trigger))
             if limited:
                 text = "a TRIGGER would act beyond its motion: it acts at the last place there"
-                self.notes.append(Note(one.place, text, Effect.TIMES))
-            if one.switch.path and _is_axis(command):
+                self.notes.append(Note(trigger.place, text, Effect.TIMES))
+            if trigger.switch.path and _is_axis(command):
                 text = "PATH before an axis motion, which controllers refuse: the tool's path there"
-                self.notes.append(Note(one.place, text, Effect.TIMES))
-        return found
+                self.notes.append(Note(trigger.place, text, Effect.TIMES))
+        return events
 
     def _set(self, command: SetOutput, q: FloatArray | None = None, *, listed: bool = True) -> None:
         """An output is set at the end of the last step, where the robot stands; at q (n,) where
@@ -354,7 +354,7 @@ class _Drive:
         """A pulse that is set at `at` s ends by itself, unless its output is set again before. A
         gripper's stays: its valve keeps its side.
         """
-        self._later = [one for one in self._later if not one.pulses(command.number)]
+        self._later = [event for event in self._later if not event.pulses(command.number)]
         if command.pulse > 0.0 and not self.around.grips(command.number):
             back = replace(command, value=not command.value, pulse=0.0)
             insort(self._later, _Event(at + command.pulse, back, ends_pulse=True), key=_at)
@@ -389,11 +389,11 @@ class _Drive:
 
     def _at_once(self, triggered: Sequence[SetOutput]) -> None:
         """What triggers of a motion set that leads nowhere."""
-        for one in triggered:
+        for trigger in triggered:
             if self._through:
-                self._outputs.append(one)
+                self._outputs.append(trigger)
             else:
-                self._set(one)
+                self._set(trigger)
 
     def _block(self, block: SplineBlock, triggered: Sequence[SetOutput]) -> None:
         if not self._through:
@@ -431,15 +431,15 @@ class _Drive:
         speeds = block.parts[0].speeds
         by_itself = move(curve, speeds, self.scene, _target_of(block), block.place)
         passed = np.concatenate([[0], by_itself.passing()]) * GRID_S
-        asked = stretches(block, passed, speeds.override)
-        hurried = [one for one in asked if one.longer < -GRID_S]
+        parts = stretches(block, passed, speeds.override)
+        hurried = [part for part in parts if part.longer < -GRID_S]
         if hurried:
             text = (
-                f"TIME_BLOCK asks for {sum(-one.longer for one in hurried):.3f} s less than the "
+                f"TIME_BLOCK asks for {sum(-part.longer for part in hurried):.3f} s less than the "
                 "robot needs: driven as fast as it can"
             )
             self.notes.append(Note(block.times[0].place, text, Effect.TIMES))
-        slower = [one for one in asked if one.longer > 0.0]
+        slower = [part for part in parts if part.longer > 0.0]
         names = self.scene.cell.robot.joint_names
         driven, times = stretched(trajectory([by_itself], [], names), slower, passed)
         events = self._triggers(driven, block, stages_at(times), triggered)
@@ -462,10 +462,10 @@ class _Drive:
         self.notes.append(Note(block.times[0].place, text, Effect.MOTIONS))
         by_itself = move(curve, speeds, self.scene, _target_of(block), block.place)
         passed = np.concatenate([[0], by_itself.passing()]) * GRID_S
-        own = [float(passed[one.last] - passed[one.first]) for one in block.times]
+        seconds_asked = [float(passed[part.last] - passed[part.first]) for part in block.times]
         longer = (
-            max(one.seconds / speeds.override - seconds, 0.0)
-            for one, seconds in zip(block.times, own, strict=True)
+            max(part.seconds / speeds.override - seconds, 0.0)
+            for part, seconds in zip(block.times, seconds_asked, strict=True)
         )
         return float(passed[-1]) + sum(longer)
 
@@ -481,16 +481,18 @@ class _Drive:
         self._carry(_payload_of(command), command.place)
         share = 1.0 if self._blend is None and command.blend is None else _BLENDED_JERK
         target = _target_of(command)
-        made = move(curve, speeds, self.scene, target, command.place, least=least, jerk_share=share)
+        movement = move(
+            curve, speeds, self.scene, target, command.place, least=least, jerk_share=share
+        )
         if self._through and self._blend is not None:
-            steps = overlap(self._through[-1].move, made, self._blend, self.arm)
+            steps = overlap(self._through[-1].move, movement, self._blend, self.arm)
             if steps > 0:
                 self._overlaps.append(steps)
             else:
                 self.finish()
-        self._through.append(_Driven(made, command, drawn, self.working, triggered))
+        self._through.append(_Driven(movement, command, drawn, self.working, triggered))
         self._blend = command.blend
-        self.here = made.at(np.array([made.law.total]))[0][0]
+        self.here = movement.at(np.array([movement.law.total]))[0][0]
         if self._blend is None:
             self.finish()
 
@@ -555,9 +557,9 @@ class _Drive:
     ) -> None:
         """What is set where a step begins, before it."""
         carried = self._payload
-        for one in events:
-            if isinstance(one.change, SetOutput) and one.at <= _SAME:
-                self._set(one.change, driven.positions[0])
+        for event in events:
+            if isinstance(event.change, SetOutput) and event.at <= _SAME:
+                self._set(event.change, driven.positions[0])
         self._carry(carried, place)
 
     def _under_way(
@@ -623,11 +625,11 @@ def _at(event: _Event) -> float:
 
 def _between(driven: JointTrajectory, begin: float, end: float) -> JointTrajectory:
     """The part of a trajectory from one instant to another [s], which are grid steps."""
-    first, last = (round(one / GRID_S) * GRID_NS for one in (begin, end))
+    first, last = (round(instant / GRID_S) * GRID_NS for instant in (begin, end))
     inner = driven.times_ns[(driven.times_ns > first) & (driven.times_ns < last)]
     times = np.array([first, *inner, last])
-    found = driven.sample(times / NS_PER_S)
-    return JointTrajectory(driven.joint_names, times - first, found.q, found.qd, found.qdd)
+    samples = driven.sample(times / NS_PER_S)
+    return JointTrajectory(driven.joint_names, times - first, samples.q, samples.qd, samples.qdd)
 
 
 def _payload_of(command: Motion | SplineBlock) -> Payload | None:

@@ -158,21 +158,21 @@ class _Job:
         texts = self._written([""] * len(self._steps), [])
         driven = self._driven_again(texts)
         after = self._costed(driven)
-        comments = [self._figures(k, one) for k, one in enumerate(after)]
+        comments = [self._figures(k, step) for k, step in enumerate(after)]
         texts = self._written(comments, self._header(after, texts))
-        moved = [one for one in after if not one.is_pause]
-        moving = [one for one in self._steps if not one.is_pause]
+        moved = [step for step in after if not step.is_pause]
+        moving = [step for step in self._steps if not step.is_pause]
         table, text = self._plc(texts)
         return KrlExport(
             texts.source,
             texts.data,
-            max(one.deviation for one in driven.values()),
-            _together([one.report for one in moving]),
-            _together([one.report for one in moved]),
+            max(again.deviation for again in driven.values()),
+            _together([step.report for step in moving]),
+            _together([step.report for step in moved]),
             table,
             text,
-            sum(one.duration for one in after),
-            sum(one.report.energy for one in after),
+            sum(step.duration for step in after),
+            sum(step.report.energy for step in after),
             tuple(after),
             make_remark(self._style, self._scene.cell.robot),
         )
@@ -230,8 +230,8 @@ class _Job:
         else:
             base = self._base_of(step)
             moves = [
-                replace(one, base=base) if isinstance(one, WrittenMove) else one
-                for one in self._motions[id(step)]
+                replace(motion, base=base) if isinstance(motion, WrittenMove) else motion
+                for motion in self._motions[id(step)]
             ]
             first, *others = moves
             parts += [replace(first, comment=comment), *others]
@@ -263,14 +263,14 @@ class _Job:
         foot = inverse(cell.base_pose)
         return {
             name: portable.matmul(foot, cell.machine(name).pose)
-            for name in [one for one in named if one][:BASES_MAX]
+            for name in list(filter(None, named))[:BASES_MAX]
         }
 
     def _machine_of(self, step: PlannedMovement) -> str:
         """The machine whose base the points of a movement are written in, "" for the foot."""
         leaving = step.kind == MovementKind.SERVICE_EXIT
         name = step.from_station if leaving else step.to_station
-        stations = {one.name: one.equipment for one in self._scene.cell.stations}
+        stations = {station.name: station.equipment for station in self._scene.cell.stations}
         return "" if step.is_pause else stations.get(name, "")
 
     def _base_of(self, step: PlannedMovement) -> int:
@@ -282,9 +282,9 @@ class _Job:
         program = self._make.followed(texts, self._scene)
         around = self._around(program)
         driven = (
-            one.trajectory
-            for one in drive(program, around, self._scene.cell.machine_home)[0]
-            if one.moves
+            motion.trajectory
+            for motion in drive(program, around, self._scene.cell.machine_home)[0]
+            if motion.moves
         )
         found = {}
         for step in self._steps:
@@ -311,15 +311,15 @@ class _Job:
                 after.append(replace(step, report=stood.report, power_mode=mode))
                 continue
             again = driven[id(step)].trajectory
-            found = self._evaluator(again, step)
-            if not found.verification.certified:
+            costed = self._evaluator(again, step)
+            if not costed.verification.certified:
                 raise RequestError(
                     StatusCode.INVALID_MOTION_PLAN,
                     f"{called(step)} isn't certified as the controller would drive it: "
-                    f"{found.verification.status.message}",
+                    f"{costed.verification.status.message}",
                 )
-            moved = replace(step, trajectory=again, report=found.report, duration=again.duration)
-            after.append(charge.moved(moved, found.energy, scene))
+            moved = replace(step, trajectory=again, report=costed.report, duration=again.duration)
+            after.append(charge.moved(moved, costed.energy, scene))
             here = again.positions[-1]
         return after
 
@@ -355,8 +355,8 @@ class _Job:
         cell = self._scene.cell
         planned = _total(self._steps)
         driven = _total(after)
-        moving = [one for one in after if not one.is_pause]
-        ids = list(dict.fromkeys(one.trajectory_id for one in moving if one.trajectory_id))
+        moving = [step for step in after if not step.is_pause]
+        ids = list(dict.fromkeys(step.trajectory_id for step in moving if step.trajectory_id))
         carried = ", ".join(
             f"{_load_words(load)} ({held or 'empty'})" for held, load in self._loads.items()
         )
@@ -378,7 +378,7 @@ class _Job:
         if remark := make_remark(self._style, cell.robot):
             lines.append(f"note: {remark}")
         if cell_hash := next(
-            (one.report.cell_hash for one in self._steps if one.report.cell_hash), ""
+            (step.report.cell_hash for step in self._steps if step.report.cell_hash), ""
         ):
             lines.append(f"planned in the cell of hash {cell_hash}")
         lines += [
@@ -386,7 +386,7 @@ class _Job:
         ]
         if texts.assumed:
             lines.append("numbered here, for the cell file says none; adapt them in the data list:")
-            lines += [f"  {one}" for one in texts.assumed]
+            lines += [f"  {assumption}" for assumption in texts.assumed]
         if texts.tools:
             held = [name or "empty" for name in self._loads]
             tools = _numbered(self._tools_chosen, held)
@@ -394,7 +394,9 @@ class _Job:
         if texts.bases:
             bases = _numbered(self._bases_chosen, list(texts.bases))
             lines.append(f"sets BASE_DATA of the numbers {bases}, for inline forms")
-        if any(one.origin in ("own", "asked") for one in self._tools_chosen + self._bases_chosen):
+        if any(
+            number.origin in ("own", "asked") for number in self._tools_chosen + self._bases_chosen
+        ):
             lines += [
                 "WARNING: the plant's own values of these numbers in $config.dat are replaced when",
                 "this program starts, for all programs, until somebody restores them: back them up",
@@ -438,48 +440,48 @@ def _plc_pauses(steps: Sequence[PlannedMovement], times: TransitionTimes) -> dic
     """Pauses that are spent in modes, by the id() of their steps; equal ones have one number.
     Raises RequestError for too many.
     """
-    found: dict[int, PlcPause] = {}
-    known: dict[tuple[object, ...], PlcPause] = {}
+    pauses: dict[int, PlcPause] = {}
+    numbered: dict[tuple[object, ...], PlcPause] = {}
     for step in steps:
         if not step.is_pause:
             continue
-        asked, wake_at = switch_times(step.power_mode, step.duration, times)
-        if not asked:
+        switch_at, wake_at = switch_times(step.power_mode, step.duration, times)
+        if not switch_at:
             continue
-        modes = tuple(name for name, _ in asked)
-        at = tuple(seconds for _, seconds in asked)
+        modes = tuple(name for name, _ in switch_at)
+        at = tuple(seconds for _, seconds in switch_at)
         key = (step.to_station, step.duration, modes)
-        if key not in known:
-            number = len(known) + 1
-            known[key] = PlcPause(number, step.to_station, step.duration, modes, at, wake_at)
-        found[id(step)] = known[key]
-    if len(known) > _PAUSES_MAX:
+        if key not in numbered:
+            number = len(numbered) + 1
+            numbered[key] = PlcPause(number, step.to_station, step.duration, modes, at, wake_at)
+        pauses[id(step)] = numbered[key]
+    if len(numbered) > _PAUSES_MAX:
         raise RequestError(
             StatusCode.INVALID_MOTION_PLAN,
-            f"{len(known)} different pauses are spent in power modes: a program numbers at most "
+            f"{len(numbered)} different pauses are spent in power modes: a program numbers at most "
             f"{_PAUSES_MAX}",
         )
-    return found
+    return pauses
 
 
 def _loads(steps: Sequence[PlannedMovement], evaluator: StepEvaluator) -> dict[str, Payload]:
     """What is carried in the program, by the part that is held, "" for none; the load at the start
     is first.
     """
-    found: dict[str, Payload] = {}
+    loads: dict[str, Payload] = {}
     for step, held in zip(steps, _held(steps)[:-1], strict=True):
-        found.setdefault(held, payload_of(evaluator.scene(step).loads))
+        loads.setdefault(held, payload_of(evaluator.scene(step).loads))
     last = _held(steps)[-1]
-    found.setdefault(last, payload_of(evaluator.scene(steps[-1]).cell.loads(last)))
-    return found
+    loads.setdefault(last, payload_of(evaluator.scene(steps[-1]).cell.loads(last)))
+    return loads
 
 
 def _held(steps: Sequence[PlannedMovement]) -> list[str]:
     """The part that is held while each step runs, and after the last one."""
-    found = [""]
+    held = [""]
     for step in steps:
-        found.append(step.attach or ("" if step.detach else found[-1]))
-    return found
+        held.append(step.attach or ("" if step.detach else held[-1]))
+    return held
 
 
 def _carried(steps: Sequence[PlannedMovement], loads: Mapping[str, Payload]) -> list[int]:

@@ -131,7 +131,9 @@ def check_near(
 def tcp_at(link: str, pose: FloatArray, cell: Cell) -> FloatArray:
     """Pose (4, 4) of the tcp where a link of the hand is at `pose` (4, 4), both in the cell."""
     flange = cell.robot.link_names[-1]
-    hand = {each.name: each.pose for each in fixed_frames(cell.robot, (), cell.tcp, cell.base_pose)}
+    hand = {
+        frame.name: frame.pose for frame in fixed_frames(cell.robot, (), cell.tcp, cell.base_pose)
+    }
     at = {flange: np.eye(4), **{name: hand[name] for name in ("flange", "tool0", TIP)}}
     if link not in ("", *at):
         raise refusal(
@@ -190,7 +192,7 @@ def _goal(given: Any, cell: Cell, what: str) -> Any:
 
 
 def _joint_goal(given: Sequence[Any], cell: Cell, what: str) -> Any:
-    values = {each.joint_name: each for each in given}
+    values = {constraint.joint_name: constraint for constraint in given}
     joints = cell.robot.joint_names
     if len(values) != len(given):
         raise refusal(what, "it names a joint twice")
@@ -199,9 +201,9 @@ def _joint_goal(given: Sequence[Any], cell: Cell, what: str) -> Any:
     if missing or unknown:
         which = f"{', '.join(missing)} missing" if missing else f"{shown(unknown[0])} unknown"
         raise refusal(what, f"{which}: all joints {', '.join(joints)} make a goal")
-    for each in given:
-        _tolerance(each.tolerance_above, f"{what}, {each.joint_name}")
-        _tolerance(each.tolerance_below, f"{what}, {each.joint_name}")
+    for constraint in given:
+        _tolerance(constraint.tolerance_above, f"{what}, {constraint.joint_name}")
+        _tolerance(constraint.tolerance_below, f"{what}, {constraint.joint_name}")
     return JointState(name=list(joints), position=[float(values[name].position) for name in joints])
 
 
@@ -280,12 +282,12 @@ def keep_upright(constraints: Any, options: PlanOptions, cell: Cell) -> None:
     what = "path_constraints"
     if kinds != {**dict.fromkeys(_KINDS, 0), "orientation_constraints": 1}:
         raise refusal(what, "one orientation constraint is kept along the way, and nothing else")
-    given = constraints.orientation_constraints[0]
-    tolerance = [float(getattr(given, f"absolute_{axis}_axis_tolerance")) for axis in "xyz"]
+    orientation = constraints.orientation_constraints[0]
+    tolerance = [float(getattr(orientation, f"absolute_{axis}_axis_tolerance")) for axis in "xyz"]
     for value in tolerance:
         _tolerance(value, what)
     free = [k for k in range(3) if tolerance[k] >= _WHOLE_TURN]
-    by_vector = getattr(given, "parameterization", 0) == _ROTATION_VECTOR
+    by_vector = getattr(orientation, "parameterization", 0) == _ROTATION_VECTOR
     if len(free) != 1 or (free == [1] and not by_vector):
         raise refusal(
             what,
@@ -294,17 +296,17 @@ def keep_upright(constraints: Any, options: PlanOptions, cell: Cell) -> None:
             "rotation vector only), and bound the others",
         )
     least = min(tolerance[k] for k in range(3) if k != free[0])
-    frame = frame_pose(given.header.frame_id, cell, what)
-    q = given.orientation
+    frame = frame_pose(orientation.header.frame_id, cell, what)
+    q = orientation.orientation
     try:
-        asked = rotation_from_quaternion(np.array((q.x, q.y, q.z, q.w)))
+        rotation = rotation_from_quaternion(np.array((q.x, q.y, q.z, q.w)))
     except InvalidValueError as error:
         raise RequestError(_TURN, f"{what}: {error}") from error
-    hand = tcp_at(given.link_name, np.eye(4), cell)[:3, :3]
+    hand = tcp_at(orientation.link_name, np.eye(4), cell)[:3, :3]
     # a rotation vector is up to pi / 2 times as long across the axis as the axis leans
     options.tilt_max = 2.0 * float(portable.arcsin(least / np.pi)) if by_vector else least
     options.tilt_axis = hand[free[0]].tolist()
-    options.tilt_direction = portable.matmul(frame[:3, :3], asked)[:, free[0]].tolist()
+    options.tilt_direction = portable.matmul(frame[:3, :3], rotation)[:, free[0]].tolist()
 
 
 def ik_pose(given: Any, cell: Cell, group: str) -> FloatArray:

@@ -157,15 +157,15 @@ def _in_order(positions: FloatArray, points: FloatArray) -> NDArray[np.int64]:
     before; of a point that isn't among them that of the nearest one, which leaves some for the
     points after it.
     """
-    found = [0]
+    indices = [0]
     for k, point in enumerate(points[1:-1], start=1):
-        first = min(found[-1] + 1, len(positions) - 1)
+        first = min(indices[-1] + 1, len(positions) - 1)
         away = np.abs(
             positions[first : max(len(positions) - len(points) + 1 + k, first + 1)] - point
         )
         here = np.flatnonzero(away.max(axis=1) < _SAME)
-        found.append(first + int(here[0] if len(here) else np.argmin(away.max(axis=1))))
-    return np.array([*found, len(positions) - 1])
+        indices.append(first + int(here[0] if len(here) else np.argmin(away.max(axis=1))))
+    return np.array([*indices, len(positions) - 1])
 
 
 def optimised_profile(
@@ -183,7 +183,7 @@ def optimised_profile(
     weights = objective_weights(context, path.q[::_SPARSE])
     stiffness, smoothing, most = effort
     cost = spline_cost(context, limits, weights, stiffness * weights.power, smoothing=smoothing)
-    found = cost.descend_profile(
+    descent = cost.descend_profile(
         path.cubics,
         s,
         duration,
@@ -191,7 +191,7 @@ def optimised_profile(
         evaluations=most,
         tolerance=_GAIN,
     )
-    return found.s, found.duration, found.evaluations
+    return descent.s, descent.duration, descent.evaluations
 
 
 # Points that a spline passes exactly, by the correction of its control points of least jerk.
@@ -374,9 +374,9 @@ def along_its_path(
     """
     path = FixedPath(given, points)
     for speed in SPEED_MARGINS if context.options.duration > 0.0 else (1.0,):
-        found = _along(path, points, (limits, speed), effort, context)
-        if found is not None:
-            spline, passing, s = found
+        timed = _along(path, points, (limits, speed), effort, context)
+        if timed is not None:
+            spline, passing, s = timed
             trajectory, exact = passing.sent(spline, given.joint_names)
             return PathTiming(trajectory, path.deviation(exact, s))
     return None
@@ -493,16 +493,16 @@ def rescaled(
     def along(limits: MotionLimits) -> Movement | None:
         if context.work.exhausted:
             return None
-        found = along_its_path(movement.trajectory, movement.path, limits, context, effort)
-        if found is None or found.deviation > KEPT:
+        timed = along_its_path(movement.trajectory, movement.path, limits, context, effort)
+        if timed is None or timed.deviation > KEPT:
             context.journal.reject("no better time scaling along the path")
             return None
-        kept = f"within {found.deviation * 1e3:.2f} mrad of its path"
-        return Movement(movement.path, found.trajectory, context, kept)
+        note = f"within {timed.deviation * 1e3:.2f} mrad of its path"
+        return Movement(movement.path, timed.trajectory, context, note)
 
-    found = within_torque(along, context)
-    violation = None if found is None else found.prove().violation
+    timed = within_torque(along, context)
+    violation = None if timed is None else timed.prove().violation
     if violation is not None:
         context.journal.reject(f"a time scaling along the path isn't certified: {violation.what}")
         return None
-    return found
+    return timed

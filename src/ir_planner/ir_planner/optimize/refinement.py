@@ -141,20 +141,20 @@ def within_duration(fastest: Movement, context: Context, near: Near) -> Movement
     """
     requested = context.options.duration
     best = None
-    known = fastest
+    nearest = fastest
     value = _FIRST * context.scene.cell.robot.time_value
     late = 0.0
     early = 0.0
     for _ in range(_DESCENTS):
-        asked = replace(context.asking("time_and_energy").options, time_value=value)
-        found = near(known, replace(context, options=asked))
-        duration = found.trajectory.duration if found is not None else float("inf")
-        if found is None or duration > requested * (1.0 + DURATION_SLACK):
+        priced = replace(context.asking("time_and_energy").options, time_value=value)
+        movement = near(nearest, replace(context, options=priced))
+        duration = movement.trajectory.duration if movement is not None else float("inf")
+        if movement is None or duration > requested * (1.0 + DURATION_SLACK):
             late = value
         else:
-            known = found
+            nearest = movement
             early = value
-            slower = replace(found, context=context).stretched_by(max(requested / duration, 1.0))
+            slower = replace(movement, context=context).stretched_by(max(requested / duration, 1.0))
             if slower.prove().certified and (best is None or slower.cost < best.cost):
                 best = slower
             if duration > _ENOUGH * requested:
@@ -255,11 +255,11 @@ class Refinement:
         """
         span = trajectory.duration
         count = int(np.clip(np.ceil(span / SPACING), FEWEST, MOST))
-        own = along_motion(trajectory, count, self.context.options.duration or span)
+        fitted = along_motion(trajectory, count, self.context.options.duration or span)
         if self.context.motion is None:
-            return self.coarse_from(own, path, THOROUGH.coarse)
-        ends = np.concatenate([own.control[[0, -1], None], self.context.motion], axis=1)
-        spline = UniformSpline(own.control, own.interval, ends)
+            return self.coarse_from(fitted, path, THOROUGH.coarse)
+        ends = np.concatenate([fitted.control[[0, -1], None], self.context.motion], axis=1)
+        spline = UniformSpline(fitted.control, fitted.interval, ends)
         return self.coarse_from(spline, path, THOROUGH.coarse)
 
     def coarse_from(self, spline: UniformSpline, path: FloatArray, evaluations: int) -> Solution:
@@ -282,15 +282,15 @@ class Refinement:
         """The movement that a coarse solution on a path (M, n) becomes, proved; None if none can
         be.
         """
-        found = self._refined(solution, path, effort)
+        movement = self._refined(solution, path, effort)
         if self.context.options.duration > 0.0:
             for speed in SPEED_MARGINS[1:]:
-                if found is None:
+                if movement is None:
                     slower = self._optimised(replace(solution, speed=speed), path)
-                    found = self._refined(slower, path, effort)
-            if found is None and self.context.motion is None:
+                    movement = self._refined(slower, path, effort)
+            if movement is None and self.context.motion is None:
                 return self._at_a_short_duration(path)
-        return found
+        return movement
 
     def near(self, known: Sequence[Movement]) -> Movement | None:
         """By descent from the known one whose coarse solution costs least; None if it isn't
@@ -298,16 +298,16 @@ class Refinement:
         """
         starts = [(self._coarse_near(one), one.path) for one in known]
         coarse, path = min(starts, key=lambda start: start[0].cost)
-        found = self.refined(coarse, path)
-        return found if found is not None and found.prove().certified else None
+        movement = self.refined(coarse, path)
+        return movement if movement is not None and movement.prove().certified else None
 
     def _coarse_near(self, known: Movement) -> Solution:
         robot = self.context.scene.cell.robot
         path = known.path
         least = fewest_seconds(path, self.limits.velocity, self.limits.acceleration)
         count = int(np.clip(np.ceil(least / SPACING), FEWEST, MOST))
-        own = max(known.trajectory.duration, least)
-        start = along_motion(known.trajectory, count, self.context.options.duration or own)
+        duration = max(known.trajectory.duration, least)
+        start = along_motion(known.trajectory, count, self.context.options.duration or duration)
         control = np.clip(start.control, robot.position_min, robot.position_max)
         return self.coarse_from(UniformSpline(control, start.interval), path, QUICK.coarse)
 
@@ -318,18 +318,18 @@ class Refinement:
         requested = self.context.options.duration
         fastest = Refinement(self.context.asking("time"))
         for effort in (QUICK, THOROUGH):
-            found = fastest.refined(fastest.coarse(path, effort.coarse), path, effort)
-            if found is None:
+            hurried = fastest.refined(fastest.coarse(path, effort.coarse), path, effort)
+            if hurried is None:
                 continue
-            duration = found.trajectory.duration
+            duration = hurried.trajectory.duration
             self.shortest = min(self.shortest, duration)
             if duration <= requested * (1.0 + DURATION_SLACK):
-                movement = replace(found, context=self.context).stretched_by(
+                movement = replace(hurried, context=self.context).stretched_by(
                     max(requested / duration, 1.0)
                 )
                 if movement.prove_path() is None:
                     cheaper = within_duration(
-                        found, self.context, lambda one, asked: Refinement(asked).near([one])
+                        hurried, self.context, lambda one, asked: Refinement(asked).near([one])
                     )
                     return min(
                         (m for m in (movement, cheaper) if m is not None), key=lambda m: m.cost
@@ -357,17 +357,17 @@ class Refinement:
                 break
         solution = self._as_fast_as_requested(solution, path)
         for _ in range(_REPAIRS + 1):
-            found = self._proved(solution, path)
-            if not isinstance(found, Violation):
-                return found
-            if found.what == TILT:
+            outcome = self._proved(solution, path)
+            if not isinstance(outcome, Violation):
+                return outcome
+            if outcome.what == TILT:
                 wider = replace(
-                    solution, upright=solution.upright + max(found.excess, 0.0) + _UPRIGHT_STEP
+                    solution, upright=solution.upright + max(outcome.excess, 0.0) + _UPRIGHT_STEP
                 )
-            elif found.pair is None:
+            elif outcome.pair is None:
                 return None
             else:
-                wider = self._with_larger_margin(solution, found)
+                wider = self._with_larger_margin(solution, outcome)
             solution = self._repaired(wider, path, _REPAIR_EVALUATIONS)
         return None
 
@@ -417,7 +417,7 @@ class Refinement:
         affordable = int(SHARE_OF_WORK * work.left / (EDGES_PER_INTERVAL * spline.intervals))
         if affordable < 1:
             return solution
-        found = self.cost(solution, path).descend(
+        descent = self.cost(solution, path).descend(
             spline.control,
             spline.interval,
             self._rows(spline),
@@ -426,10 +426,10 @@ class Refinement:
             tolerance=solution.stage.tolerance,
             ends=spline.ends,
         )
-        work.spend(int(np.ceil(found.evaluations * spline.intervals * EDGES_PER_INTERVAL)))
+        work.spend(int(np.ceil(descent.evaluations * spline.intervals * EDGES_PER_INTERVAL)))
         # a spline stays within the range of its control points
-        control = np.minimum(np.maximum(found.control, robot.position_min), robot.position_max)
-        return solution.ended(UniformSpline(control, found.interval, spline.ends), found.value)
+        control = np.minimum(np.maximum(descent.control, robot.position_min), robot.position_max)
+        return solution.ended(UniformSpline(control, descent.interval, spline.ends), descent.value)
 
     def cost(self, solution: Solution, path: FloatArray) -> SplineCost:
         """What a solution on a path (M, n) is optimised for."""
@@ -439,9 +439,9 @@ class Refinement:
         penalty = weights.power * max(stiffer * stage.stiffness, _STIFFNESS)
         key = (penalty, stage.smoothing, solution.speed, solution.torque, weights.travel.tobytes())
         usual = solution.kept is self._kept and solution.upright == 0.0
-        known = self._costs.get(key) if usual else None
-        if known is not None:
-            return known
+        cached = self._costs.get(key) if usual else None
+        if cached is not None:
+            return cached
         limits = self.limits.with_torque_share(solution.torque).for_speed(solution.speed)
         bounds = (solution.kept, stage.smoothing, solution.upright)
         cost = spline_cost(self.context, limits, weights, penalty, *bounds)
@@ -466,11 +466,11 @@ class Refinement:
     def _with_larger_margin(self, solution: Solution, found: Violation) -> Solution:
         assert found.pair is not None  # asked before
         names = (found.pair.body_a, found.pair.body_b)
-        kept = solution.kept.copy()
+        thresholds = solution.kept.copy()
         for z, pair in enumerate(self.context.scene.collision.pairs):
             if (pair.body_a, pair.body_b) == names:
-                kept[:, z] += max(found.excess, 0.0) + _MARGIN_STEP
-        return replace(solution, kept=kept)
+                thresholds[:, z] += max(found.excess, 0.0) + _MARGIN_STEP
+        return replace(solution, kept=thresholds)
 
     def _proved(self, solution: Solution, path: FloatArray) -> Movement | Violation | None:
         """The movement, or where it goes astray; None where its limits can't be kept."""
@@ -513,8 +513,12 @@ def movement_over(path: FloatArray, context: Context) -> Movement:
     """
     if context.options.timing == "asynchronous":
         common = movement_over(path, context.with_timing("synchronous"))
-        own = straight_steps(distinct(path), context)
-        return own if own.prove().certified and own.cost <= common.cost else common
+        asynchronous = straight_steps(distinct(path), context)
+        return (
+            asynchronous
+            if asynchronous.prove().certified and asynchronous.cost <= common.cost
+            else common
+        )
     path = distinct(path)
     if len(path) > 1:
         refinement = Refinement(context)
@@ -522,9 +526,9 @@ def movement_over(path: FloatArray, context: Context) -> Movement:
             THOROUGH,
             QUICK,
         ):  # the second ends elsewhere, where the first isn't certified
-            found = refinement.refined(refinement.coarse(path, effort.coarse), path, effort)
-            if found is not None and found.prove().certified:
-                return found
+            movement = refinement.refined(refinement.coarse(path, effort.coarse), path, effort)
+            if movement is not None and movement.prove().certified:
+                return movement
         refinement.check_requested()
     return straight_steps(path, context)
 

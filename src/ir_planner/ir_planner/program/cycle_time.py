@@ -56,23 +56,23 @@ def shared_out(values: TimeValues, task: CycleTask) -> Timed | None:
     """The cheapest distribution of the time over movements and wait; None where it is too short."""
     fronts = values.fronts()
     chosen = {part: front[0] for part, front in fronts.items()}
-    left = task.seconds - sum(point.seconds for point in chosen.values())
-    if left < 0.0:
+    spare = task.seconds - sum(point.seconds for point in chosen.values())
+    if spare < 0.0:
         return None
     steps = slow_downs(fronts)
     too_long: dict[HopPart, SlowDown] = {}  # the first step of a part that doesn't fit, and ends it
-    found = _filled(chosen, left, steps, task)
+    options = _filled(chosen, spare, steps, task)
     for k, step in enumerate(steps):
         if step.part in too_long:
             continue
-        if step.seconds > left:
+        if step.seconds > spare:
             too_long[step.part] = step
             continue
         chosen = {**chosen, step.part: fronts[step.part][step.to]}
-        left -= step.seconds
-        found += _filled(chosen, left, [*too_long.values(), *steps[k + 1 :]], task)
-    found.sort(key=lambda timed: timed.energy)
-    whole = [replace(timed, energy=task.spent(timed)) for timed in found[:_NEAREST]]
+        spare -= step.seconds
+        options += _filled(chosen, spare, [*too_long.values(), *steps[k + 1 :]], task)
+    options.sort(key=lambda timed: timed.energy)
+    whole = [replace(timed, energy=task.spent(timed)) for timed in options[:_NEAREST]]
     return min(whole, key=lambda timed: timed.energy, default=None)
 
 
@@ -91,12 +91,12 @@ def _filled(
     """
     movements = {part: point.movement for part, point in chosen.items()}
     energy = sum(movement.energy.total for movement in movements.values())
-    found = [Timed(movements, left, energy + task.waiting(left))] if left >= SHORTEST_WAIT else []
+    options = [Timed(movements, left, energy + task.waiting(left))] if left >= SHORTEST_WAIT else []
     if not chosen:  # pauses alone: nothing can be slowed down
-        return found or [Timed(movements, 0.0, energy)]
+        return options or [Timed(movements, 0.0, energy)]
     last = bool(open_steps) and left <= open_steps[0].seconds
     if not (last or not open_steps or left < SHORTEST_WAIT):
-        return found  # a whole step fits: that program comes next
+        return options  # a whole step fits: that program comes next
     part = (
         open_steps[0].part if open_steps else max(chosen, key=lambda part: _to_slow(chosen[part]))
     )
@@ -104,8 +104,8 @@ def _filled(
     after = task.slower(before, before.trajectory.duration + left)
     if after is not None:
         more = after.energy.total - before.energy.total
-        found.append(Timed({**movements, part: after}, 0.0, energy + more))
-    return found
+        options.append(Timed({**movements, part: after}, 0.0, energy + more))
+    return options
 
 
 # How far above the best an answer can be: of its cost, what lies above a lower bound, in percent.
@@ -242,16 +242,16 @@ def _cheaper_chain(
         rung -= 1  # the chain that is fastest of all is not needed, and says nothing of joules
     if abs(rung - choice.ladder.first) <= _SAME_CHAIN:
         return first, bound
-    other = _cheapest_at(rung, choice, progress)
-    if other is None:
+    rival = _cheapest_at(rung, choice, progress)
+    if rival is None:
         return first, bound
 
     best = first
-    if other.chain.chosen != choice.chain.chosen:
-        second = _tried(other, seconds, standing, rung)
+    if rival.chain.chosen != choice.chain.chosen:
+        second = _tried(rival, seconds, standing, rung)
         best = second if second.energy < first.energy else first
     if rung != FASTEST:
-        bound = max(bound, best.bound(other.chain, choice.ladder.rates(rung).second, seconds))
+        bound = max(bound, best.bound(rival.chain, choice.ladder.rates(rung).second, seconds))
     return best, bound
 
 
@@ -308,11 +308,11 @@ def _fastest(best: _Tried, seconds: float, standing: float, progress: Progress) 
     slow; once work has ended, the one of straight segments. At high values of a second some
     movements are faster than those for time alone, which are all that a request for time has tried.
     """
-    own = best.choice
-    again = [own] if own.ladder.first == FASTEST else []
-    other = _cheapest_at(FASTEST, own, progress)
-    if other is not None and other.chain.chosen != own.chain.chosen:
-        again.append(other)
+    chain = best.choice
+    again = [chain] if chain.ladder.first == FASTEST else []
+    rival = _cheapest_at(FASTEST, chain, progress)
+    if rival is not None and rival.chain.chosen != chain.chain.chosen:
+        again.append(rival)
     tried = [best, *(_tried(choice, seconds, standing, FASTEST - 1) for choice in again)]
     return min(tried, key=lambda each: (each.energy, each.values.shortest))
 

@@ -81,28 +81,28 @@ class Ladder:
         return self._kept(rung, 1)
 
     def _kept(self, rung: int, most: int) -> Movements:
-        known = self._searched(rung)[:most]
-        key = rung, len(known)
+        movements = self._searched(rung)[:most]
+        key = rung, len(movements)
         if key not in self._rungs:
-            self._rungs[key] = self._made(rung, known)
+            self._rungs[key] = self._made(rung, movements)
         return self._rungs[key]
 
     def _made(self, rung: int, known: tuple[Movements, ...]) -> Movements:
-        own = self.own
+        first = self.own
         if abs(rung - self._place) < _SAME:
-            return own
+            return first
         near = WarmStarts(known, self._lines(rung), self._scaling(rung))
-        return Movements(own.route, own.layers, self._context(rung), own.searches, near)
+        return Movements(first.route, first.layers, self._context(rung), first.searches, near)
 
     def _context(self, rung: int) -> Context:
-        own = self.own.context
+        first = self.own.context
         if rung == FASTEST:
-            return own.asking("time")
-        robot = own.scene.cell.robot
-        asked = replace(
-            own.asking("time_and_energy").options, time_value=LADDER[rung] * robot.time_value
+            return first.asking("time")
+        robot = first.scene.cell.robot
+        slower = replace(
+            first.asking("time_and_energy").options, time_value=LADDER[rung] * robot.time_value
         )
-        return replace(own, options=asked)
+        return replace(first, options=slower)
 
     def rates(self, rung: int) -> Rates:
         """What is minimised at a rung."""
@@ -112,18 +112,18 @@ class Ladder:
         """Movements across at a rung, by descent from given ones; those of the parts for which one
         is found. None where movements are not found by descent.
         """
-        own = self.own
+        first = self.own
         again = Movements(
-            own.route,
-            own.layers,
+            first.route,
+            first.layers,
             self._context(rung),
-            own.searches,
+            first.searches,
             WarmStarts((KnownMovements(known),)),
         )
         if not again.descends:
             return {}
         planned = zip(known, again.plan(list(known), self.improvement), strict=True)
-        return {part: found for part, found in planned if not isinstance(found, Failure)}
+        return {part: movement for part, movement in planned if not isinstance(movement, Failure)}
 
     def _searched(self, rung: int) -> tuple[Movements, ...]:
         """Searched movements, of the nearest value first, from which those of a rung are optimised;
@@ -238,12 +238,12 @@ class TimeValues:
     def _take(self, movements: Movements) -> float:
         seconds = 0.0
         planned = movements.plan(self.parts, self.ladder.improvement)
-        for part, found in zip(self.parts, planned, strict=True):
-            if not isinstance(found, Failure):
-                self._points[part].append(FrontPoint.of(found))
+        for part, answer in zip(self.parts, planned, strict=True):
+            if not isinstance(answer, Failure):
+                self._points[part].append(FrontPoint.of(answer))
                 seconds += self._points[part][-1].seconds
             elif movements is self.ladder.own:
-                raise StageError(found.status)
+                raise StageError(answer.status)
             else:  # what is known has to do
                 seconds += min(point.seconds for point in self._points[part])
         return seconds
@@ -282,16 +282,16 @@ class TimeValues:
             rates = ladder.rates(rung)
             poor = dict[HopPart, Movement]()
             for part, points in self._points.items():
-                own = ladder.at(rung).movement(part)
+                present = ladder.at(rung).movement(part)
                 best = min(points, key=lambda point: point.cost(rates))
-                if own is None or part.kind != ACROSS or (rung, part) in self._exchanged:
+                if present is None or part.kind != ACROSS or (rung, part) in self._exchanged:
                     continue
-                if best.cost(rates) < (1.0 - _POOR) * FrontPoint.of(own).cost(rates):
+                if best.cost(rates) < (1.0 - _POOR) * FrontPoint.of(present).cost(rates):
                     poor[part] = best.movement
             self._exchanged.update((rung, part) for part in poor)
             if poor and not ladder.own.context.work.exhausted:
-                for part, found in ladder.from_others(rung, poor).items():
-                    self._points[part].append(FrontPoint.of(found))
+                for part, rival in ladder.from_others(rung, poor).items():
+                    self._points[part].append(FrontPoint.of(rival))
 
     def least(self, value: float) -> float:
         """What the chain costs at a value of a second [W], by all movements that are known."""

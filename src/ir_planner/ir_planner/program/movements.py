@@ -32,9 +32,9 @@ def optimised_near(known: Sequence[Movement], context: Context) -> Movement | No
     """The cheapest certified movement by descent from known ones, at least one, or the cheapest of
     them slowed down; None where neither is certified.
     """
-    found = (optimize.optimised_near_best(known, context), slowed_near(known, context))
+    candidates = (optimize.optimised_near_best(known, context), slowed_near(known, context))
     certified = [
-        movement for movement in found if movement is not None and movement.prove().certified
+        movement for movement in candidates if movement is not None and movement.prove().certified
     ]
     return min(certified, key=lambda movement: movement.cost, default=None)
 
@@ -75,14 +75,14 @@ def mapped(
     improvement: work of each for better answers; most: of each at all. Raises
     what the first failing task raises, CancelledError when asked to stop.
     """
-    own = [_own(context, improvement, left) for left in most]
+    contexts = [_own(context, improvement, edges) for edges in most]
     count = min(context.work.threads or len(os.sched_getaffinity(0)), len(items))
     if count <= 1:
-        results = [task(item, mine) for item, mine in zip(items, own, strict=True)]
+        results = [task(item, mine) for item, mine in zip(items, contexts, strict=True)]
     else:
         with ThreadPoolExecutor(count) as pool:
-            results = list(pool.map(task, items, own))
-    for mine in own:
+            results = list(pool.map(task, items, contexts))
+    for mine in contexts:
         context.work.iterations += mine.work.iterations
         context.work.truncated |= mine.work.truncated
         context.journal.rejected.update(mine.journal.rejected)
@@ -181,15 +181,15 @@ class Movements:
         new = {key: part for part in parts if (key := self._key(part)) not in self._found}
         near = self._near
         lines = [part for part in new.values() if part.kind != ACROSS]
-        for known in (*near.lines, *([near.scaling] if near.scaling else [])):
-            known.plan(lines, improvement)
-        for known in (each for each in near.across if isinstance(each, Movements)):
-            known.plan([part for part in new.values() if part.kind == ACROSS], improvement)
+        for earlier in (*near.lines, *([near.scaling] if near.scaling else [])):
+            earlier.plan(lines, improvement)
+        for earlier in (each for each in near.across if isinstance(each, Movements)):
+            earlier.plan([part for part in new.values() if part.kind == ACROSS], improvement)
         planned = self._shared(list(new.values()), improvement)
-        for key, found in zip(new, planned, strict=True):
-            self._found[key] = found
-            if isinstance(found, Failure):
-                self.unreachable = found.status
+        for key, planned_part in zip(new, planned, strict=True):
+            self._found[key] = planned_part
+            if isinstance(planned_part, Failure):
+                self.unreachable = planned_part.status
         return [self._found[self._key(part)] for part in parts]
 
     def _shared(self, parts: list[HopPart], improvement: int) -> list[Movement | Failure]:
@@ -204,7 +204,7 @@ class Movements:
         of_line = left // (_PARTS * max(len(self.route), 1))
         most = [of_one if part.kind == ACROSS else min(of_one, of_line) for part in parts]
         planned = mapped(self._planned, parts, self.context, min(improvement, of_one // 2), most)
-        failed = [k for k, found in enumerate(planned) if isinstance(found, Failure)]
+        failed = [k for k, answer in enumerate(planned) if isinstance(answer, Failure)]
         for later, k in enumerate(failed, start=1 - len(failed)):
             if most[k] < (left := self.context.work.left):
                 improving = min(improvement, left // (2 - 2 * later))
@@ -213,8 +213,8 @@ class Movements:
 
     def movement(self, part: HopPart) -> Movement | None:
         """The movement of a part that was planned; None where none was found."""
-        found = self._found[self._key(part)]
-        return found if isinstance(found, Movement) else None
+        answer = self._found[self._key(part)]
+        return answer if isinstance(answer, Movement) else None
 
     def logs(self, part: HopPart) -> list[SearchLog]:
         """What the search for the movement of a part did, where it keeps a log."""
@@ -282,24 +282,24 @@ class Movements:
         return self._across(part, inside) if part.kind == ACROSS else self._along_line(part, inside)
 
     def _across(self, part: HopPart, context: Context) -> Movement | Failure:
-        known = _known(self._near.across, part)
-        asked = context.planned_by(self._planner(part))
+        near = _known(self._near.across, part)
+        timed = context.planned_by(self._planner(part))
         via = self.route.at(part.hop).step.via
         if via is not None:
-            status, found = self._past_places(part, via, asked)
-            slower = slowed_near(known, context)  # a descent could miss a place
-            if slower is not None and (found is None or slower.cost < found.cost):
+            status, movement = self._past_places(part, via, timed)
+            slower = slowed_near(near, context)  # a descent could miss a place
+            if slower is not None and (movement is None or slower.cost < movement.cost):
                 return slower
         else:
-            again = optimised_near(known, context) if known else None
+            again = optimised_near(near, context) if near else None
             if again is not None:
                 return again
-            status, found = search_regional(*self.ends(part), asked, self.searches)
+            status, movement = search_regional(*self.ends(part), timed, self.searches)
         self._logs[self._key(part)] = context.journal.logs
         here = self.route.name(part.hop - 1)
         there = self.route.name(part.hop)
         what = f"from {here or 'the start'} to {there}"
-        return found or Failure(Status(status.code, f"{what}: {status.message}"))
+        return movement or Failure(Status(status.code, f"{what}: {status.message}"))
 
     def _past_places(
         self, part: HopPart, via: StepVia, context: Context
@@ -313,8 +313,10 @@ class Movements:
         improvement = work.improvement // (len(places) + 2)
 
         def leg() -> Context:
-            own = Work(share, work.deadline, work.clock, work.cancelled, improvement, work.threads)
-            return replace(context, journal=Journal(own, context.journal.seed))
+            share_of_work = Work(
+                share, work.deadline, work.clock, work.cancelled, improvement, work.threads
+            )
+            return replace(context, journal=Journal(share_of_work, context.journal.seed))
 
         asked = Via(places, via.tolerance, via.distance)
         goal = Goal(configuration=second)
@@ -341,16 +343,16 @@ class Movements:
             return slower
         scaling = _known((self._near.scaling,), part)
         try:
-            found = timed_service(
+            movement = timed_service(
                 self.nodes(part)[0].line, entry, at, scaling[0] if scaling else None
             )
         except TimingError as error:
             return Failure(Status(StatusCode.PLANNING_FAILED, f"{what}: {error}"))
-        violation = found.prove().violation
+        violation = movement.prove().violation
         if violation is not None:
             return Failure(Status(StatusCode.PLANNING_FAILED, f"{what}: {violation.sentence}"))
         same = slowed_near(scaling, at)
-        return same if same is not None and same.cost < found.cost else found
+        return same if same is not None and same.cost < movement.cost else movement
 
 
 def _known(those: Sequence[MovementSource | None], part: HopPart) -> list[Movement]:

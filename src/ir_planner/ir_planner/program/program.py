@@ -55,17 +55,17 @@ def logs_of(choice: Choice, steps: Sequence[PlannedMovement]) -> Iterator[Search
     program.
     """
     movements = choice.movements
-    seen = set[int]()
+    exits = set[int]()
     for place, row in enumerate(choice.chain.chosen):
         node: StopNode = movements.layers[place][row]
-        found = node.line.exit
-        if found is not None and id(found) not in seen:
-            seen.add(id(found))
-            yield _withdrawal_log(place - 1, node, found, movements)
+        exit_ = node.line.exit
+        if exit_ is not None and id(exit_) not in exits:
+            exits.add(id(exit_))
+            yield _withdrawal_log(place - 1, node, exit_, movements)
     for part in choice.parts:
         for log in movements.logs(part):
-            if isinstance(log, CorrectionLog) and id(log) not in seen:
-                seen.add(id(log))
+            if isinstance(log, CorrectionLog) and id(log) not in exits:
+                exits.add(id(log))
                 names = movements.route.name(part.hop - 1), movements.route.name(part.hop)
                 driven = _driven(part, movements, steps)
                 yield replace(log, start=names[0], goal=names[1], driven=driven)
@@ -102,8 +102,8 @@ def _withdrawal_log(
     along = steps.transpose(1, 0, 2).reshape(-1, found.points.shape[1])
     walk = found.search.walk
     rejected = found.search.rejected
-    kept = found.points[:1] if walk is None else walk.kept
-    dropped = kept[:0] if walk is None else walk.dropped
+    starts = found.points[:1] if walk is None else walk.kept
+    dropped = starts[:0] if walk is None else walk.dropped
     every = max(-(-len(dropped) // _DROPPED), 1)
     arriving = movements.context.inside(scene).at(station.name)
     return WithdrawalLog(
@@ -114,7 +114,7 @@ def _withdrawal_log(
         candidates=0 if walk is None else walk.candidates,
         rejected=tuple(sorted(rejected.items(), key=lambda item: (-item[1], item[0]))),
         distance=(0.0, 0.0) if walk is None else walk.distance,
-        kept=_tool(kept, scene),
+        kept=_tool(starts, scene),
         parents=np.zeros(1, dtype=np.int64) if walk is None else walk.parents,
         dropped=_tool(dropped[::every], scene),
         path=_tool(along, scene),
@@ -193,11 +193,11 @@ def _answered(
     plan = replace(program_of(steps), gap=answer.gap)
     for log in logs_of(choice, steps):
         context.journal.keep(log)
-    said = [*_other_rests(steps, route, request), *_beyond_rests(steps, request)]
+    remarks = [*_other_rests(steps, route, request), *_beyond_rests(steps, request)]
     if choice.parts and request.options.objective == "energy" and cycle <= 0.0:
-        said = [_SLOW.format(plan.report.duration - standing), *said]
-    if said:
-        plan = replace(plan, status=Status.success("; ".join(said[:_SENTENCES])))
+        remarks = [_SLOW.format(plan.report.duration - standing), *remarks]
+    if remarks:
+        plan = replace(plan, status=Status.success("; ".join(remarks[:_SENTENCES])))
     if request.savings:
         comparison = held_against_common(choice, steps, cycle, standing, spreads, progress)
         if isinstance(comparison, str):
@@ -218,21 +218,23 @@ def _answered(
 def _other_rests(steps: Steps, route: Route, request: ProgramRequest) -> list[str]:
     """Of each pause that can't be spent in the mode that it asks for: where it is planned."""
     times = request.settings.transitions
-    asked = [placed.step for placed in route.steps if placed.step.kind == "PAUSE"]
+    pauses = [placed.step for placed in route.steps if placed.step.kind == "PAUSE"]
     pausing = iter(step for step in steps if step.is_pause)
-    said = []
-    for one in asked:
-        fits = (step for step in pausing if abs(step.duration - one.dwell) <= _SAME_PAUSE)
+    remarks = []
+    for pause in pauses:
+        fits = (step for step in pausing if abs(step.duration - pause.dwell) <= _SAME_PAUSE)
         given = next(fits, None)
-        mode = one.power_mode
+        mode = pause.power_mode
         if given is None or mode in (AUTO, given.power_mode):
             continue
         reason = "longer than the controller stands on motors"
         if mode != MOTORS:
             needed = times.enter(mode) + times.minimum_stay(mode) + times.leave(mode)
             reason = f"too short for {mode}, which takes {needed:g} s to enter, stay in and leave"
-        said.append(f"a pause of {one.dwell:g} s is {reason}: it is planned in {given.power_mode}")
-    return list(dict.fromkeys(said))
+        remarks.append(
+            f"a pause of {pause.dwell:g} s is {reason}: it is planned in {given.power_mode}"
+        )
+    return list(dict.fromkeys(remarks))
 
 
 def _beyond_rests(steps: Steps, request: ProgramRequest) -> list[str]:
@@ -241,7 +243,7 @@ def _beyond_rests(steps: Steps, request: ProgramRequest) -> list[str]:
     """
     table = request.power.rest_table
     q = request.start
-    said: dict[str, str] = {}
+    remarks: dict[str, str] = {}
     for step in steps if table is not None else ():
         if step.trajectory is not None:
             q = step.trajectory.positions[-1]
@@ -251,8 +253,10 @@ def _beyond_rests(steps: Steps, request: ProgramRequest) -> list[str]:
             load = scene_with(request.cell, step.load, request.power).load_mass
             if table.outside(q.tolist(), load):
                 where = step.from_station or "start"
-                said.setdefault(where, f"at {where} {request.power.rest_remark(q.tolist(), load)}")
-    return list(said.values())
+                remarks.setdefault(
+                    where, f"at {where} {request.power.rest_remark(q.tolist(), load)}"
+                )
+    return list(remarks.values())
 
 
 def _with_reason(status: Status, work: Work) -> Status:

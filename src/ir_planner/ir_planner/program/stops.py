@@ -118,21 +118,21 @@ def withdrawn_lines(
     """Paths out of the zone from interaction configurations (K, n), free on arriving and on
     leaving.
     """
-    found: list[ServiceLine] = []
+    lines: list[ServiceLine] = []
     searched: list[tuple[FloatArray, list[ExitPath]]] = []
     robot = both[0].scene.cell.robot
     for q in interaction:
-        known = next((paths for other, paths in searched if _turned(q, other)), None)
-        paths = _exit_paths(q, both, searches) if known is None else known
-        if known is None:
+        paths_there = next((paths for q_before, paths in searched if _turned(q, q_before)), None)
+        paths = _exit_paths(q, both, searches) if paths_there is None else paths_there
+        if paths_there is None:
             searched.append((q, paths))
             if not paths:
                 rejected[f"no withdrawal from {both[0].station} found"] += 1
         for path in paths:
             shifted = path.points + (q - path.points[0])
             if (shifted >= robot.position_min).all() and (shifted <= robot.position_max).all():
-                found.append(ServiceLine(shifted, straight=False, exit=path))
-    return found
+                lines.append(ServiceLine(shifted, straight=False, exit=path))
+    return lines
 
 
 def _turned(a: FloatArray, b: FloatArray) -> bool:
@@ -146,7 +146,7 @@ def _exit_paths(
     """Different paths (M, n) that are free in both scenes, of several searches in each of them;
     which serves best is decided with the chain.
     """
-    found: list[ExitPath] = []
+    exits: list[ExitPath] = []
     method = both[0].scene.station(both[0].station).search.withdrawal
     more = min(both[0].work.improvement // _FOR_ANOTHER, _MOST)
     for here, there in (both, both[::-1]):
@@ -154,7 +154,7 @@ def _exit_paths(
         if here.work.exhausted or not inside.states_free(q[None])[0]:
             return []
         problem = Exit.of(q, here)
-        other = Exit.of(q, there)
+        exit_there = Exit.of(q, there)
         for seed in dict.fromkeys(
             (*range(_SEARCHES), here.journal.seed, *range(_SEARCHES, _SEARCHES + more))
         ):
@@ -162,15 +162,15 @@ def _exit_paths(
             inner = Journal(here.work, seed)
             for path in withdrawal(problem, _WANTED, method, searches, inner).paths:
                 points = path.points
-                free = other.inside.edges_free(points[:-1], points[1:]).all()
-                if free and other.is_out(points[-1:])[0] and other.contacts_end(points):
+                free = exit_there.inside.edges_free(points[:-1], points[1:]).all()
+                if free and exit_there.is_out(points[-1:])[0] and exit_there.contacts_end(points):
                     paths.append(path)
-            found += sorted(paths, key=lambda path: path_cost(here.scene.weights, path.points))
-            if not found:
+            exits += sorted(paths, key=lambda path: path_cost(here.scene.weights, path.points))
+            if not exits:
                 break
-        if found or here.scene is there.scene:
+        if exits or here.scene is there.scene:
             break
-    return first_different(found, _KEPT + more, EXIT, lambda path: path.points[-1])
+    return first_different(exits, _KEPT + more, EXIT, lambda path: path.points[-1])
 
 
 # Nodes at a stop of a program: configurations that can be entered and left with what is held
@@ -211,27 +211,27 @@ def station_nodes(
     journal = arriving.journal
     name = arriving.station
     station = scene.station(name)
-    found = _configurations(station, arriving, near, interaction)
-    journal.rejected.update(found.rejected)
-    if len(found.q) == 0:
-        return [], no_configuration(station.pose, scene, found, f"station {name}")
+    configurations = _configurations(station, arriving, near, interaction)
+    journal.rejected.update(configurations.rejected)
+    if len(configurations.q) == 0:
+        return [], no_configuration(station.pose, scene, configurations, f"station {name}")
     both = (arriving, arriving.inside(leaving))
     rejected: Counter[str] = Counter()
-    lines = service_lines(found.q[:_MOST_STOPS], arriving, rejected)
+    lines = service_lines(configurations.q[:_MOST_STOPS], arriving, rejected)
     for context in both:
         free = lines_free(lines, context, rejected)
         lines = [line for line, is_free in zip(lines, free, strict=True) if is_free]
     out = leaves_zone(lines, arriving)
     straight = [line for line, leaves in zip(lines, out, strict=True) if leaves]
-    asked = station.search
-    if straight and not asked.withdrawal:
+    search = station.search
+    if straight and not search.withdrawal:
         lines = straight
     else:
-        withdrawn = withdrawn_lines(found.q[:_MOST_STOPS], both, searches, rejected)
-        lines = withdrawn if withdrawn or asked.withdrawal else lines
+        withdrawn = withdrawn_lines(configurations.q[:_MOST_STOPS], both, searches, rejected)
+        lines = withdrawn if withdrawn or search.withdrawal else lines
     journal.rejected.update(+rejected)
     if not lines:
-        return [], _no_exit(station, len(found.q), len(straight), +rejected)
+        return [], _no_exit(station, len(configurations.q), len(straight), +rejected)
     return [StopNode(line) for line in lines], Status.success()
 
 
@@ -272,7 +272,7 @@ def _configurations(
     if search.configurations == "analytic":
         return free_configurations(station.pose, scene, threshold, near)
     with journal.stage("ccd") as notes:
-        found = searched_configurations(
+        solutions = searched_configurations(
             station.pose,
             scene,
             threshold,
@@ -282,9 +282,9 @@ def _configurations(
             settings,
             journal.work,
         )
-        notes.append(f"{found.reached} of {search.starts} starts reach {station.name}")
-    journal.keep(configuration_log(station.name, found, scene))
-    return found
+        notes.append(f"{solutions.reached} of {search.starts} starts reach {station.name}")
+    journal.keep(configuration_log(station.name, solutions, scene))
+    return solutions
 
 
 # Nodes at a stop that is a path of the tool: movements along it in different configurations.
@@ -301,7 +301,7 @@ def path_nodes(arriving: Context, leaving: PlanningScene) -> tuple[list[StopNode
     path = arriving.scene.cell.path(name)
     after = FreeSpace.of(leaving, arriving.safety_distance, arriving.work)
     try:
-        found = choices_along(path, arriving, after, _MOST_PATH_STOPS)
+        paths = choices_along(path, arriving, after, _MOST_PATH_STOPS)
     except PathRefusedError as error:
         return [], _along(name, error.status)
     except HeadingError as error:
@@ -309,7 +309,8 @@ def path_nodes(arriving: Context, leaving: PlanningScene) -> tuple[list[StopNode
     except RequestError as error:  # a path that draws nothing
         raise RequestError(error.code, f"path {name}: {error}") from error
     return [
-        StopNode(ServiceLine(one.points[::-1], straight=False), one.movement) for one in found
+        StopNode(ServiceLine(driven.points[::-1], straight=False), driven.movement)
+        for driven in paths
     ], Status.success()
 
 

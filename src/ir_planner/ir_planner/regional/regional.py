@@ -85,11 +85,11 @@ def refusal(
     """The status for a movement from start to goal (n,), both free, that was not found; path: one
     was.
     """
-    found = space.scene.collision.certify_edges(start[None], goal[None], space.threshold)
+    certificate = space.scene.collision.certify_edges(start[None], goal[None], space.threshold)
     tried = ", ".join(f"{stage.name} ({stage.note})" for stage in journal.stages) or "nothing"
     cut = " within planning_time" if journal.work.truncated else ""
     cone = space.cone
-    if cone is not None and not path and found.verdict[0] == FREE:
+    if cone is not None and not path and certificate.verdict[0] == FREE:
         shares = np.linspace(0.0, 1.0, _SHARES)
         tilts = cone.tilts(start + shares[:, None] * (goal - start))
         worst = int(np.argmax(tilts))
@@ -100,7 +100,7 @@ def refusal(
             f"no path found{cut}: {sentence}; tried: {tried}; a larger tilt_max, or another start "
             "or goal configuration, may help",
         )
-    if found.verdict[0] == FREE:
+    if certificate.verdict[0] == FREE:
         rejected = (f"{reason} ({count})" for reason, count in journal.rejected.items())
         reasons = (
             "; ".join(rejected) or "max_iterations or planning_time ended before one was timed"
@@ -111,11 +111,11 @@ def refusal(
             if path
             else f"no path found{cut}, though the straight movement is free: tried: {tried}",
         )
-    share = float(found.t1[0])
+    share = float(certificate.t1[0])
     q = start + share * (goal - start)
-    pair = pair_value(space.scene, q, int(found.pair[0]))
+    pair = pair_value(space.scene, q, int(certificate.pair[0]))
     x, y, z = space.scene.chain.tcp_poses(q[None])[0, :3, 3]
-    needed = float(space.threshold[int(found.pair[0])])
+    needed = float(space.threshold[int(certificate.pair[0])])
     distance, bound = in_mm(pair.distance, needed)
     short = in_mm(max(needed - pair.distance, 0.0), 0.0)[0]
     return Status(
@@ -149,11 +149,11 @@ def plan_to_configurations(
             for goal in np.atleast_2d(goals)
         ]
     )
-    status, found = search_regional(start, goals, context, searches)
+    status, movement = search_regional(start, goals, context, searches)
     info = context.journal.info(start, context.joint_names)
-    if found is None:
+    if movement is None:
         return MovementPlan(status, info, TrajectoryReport())
-    return MovementPlan(status, info, found.report, found.trajectory, found.path)
+    return MovementPlan(status, info, movement.report, movement.trajectory, movement.path)
 
 
 def search_regional(
@@ -166,14 +166,14 @@ def search_regional(
     _check_search(context, searches)
     if context.motion is not None:
         return search_in_motion(start, np.atleast_2d(goals), context, searches)
-    status, found = _search_timed(start, goals, context, searches)
-    if found is None and TOO_HEAVY in status.message:
+    status, movement = _search_timed(start, goals, context, searches)
+    if movement is None and TOO_HEAVY in status.message:
         lines = [(np.asarray(start), goal) for goal in np.atleast_2d(goals)]
         for eased in with_less_reserve(lines, context):
-            status, found = _search_timed(start, goals, eased, searches)
-            if found is not None:
+            status, movement = _search_timed(start, goals, eased, searches)
+            if movement is not None:
                 break
-    return status, found
+    return status, movement
 
 
 def _check_search(context: Context, searches: Searches) -> None:
@@ -195,8 +195,8 @@ def _search_timed(
     """The same with the torque that the context's reserve leaves."""
     if context.options.timing != "asynchronous":
         return _search(start, goals, context, searches)
-    status, found = _search(start, goals, context.with_timing("synchronous"), searches)
-    return status, None if found is None else with_own_laws(found, context)
+    status, movement = _search(start, goals, context.with_timing("synchronous"), searches)
+    return status, None if movement is None else with_own_laws(movement, context)
 
 
 def _search(
@@ -300,10 +300,10 @@ def plan_to_goal(
     if goal.configuration is not None:
         return plan_to_configurations(start, goal.configuration[None], context, searches)
     assert goal.pose is not None  # a Goal has one of both
-    found = free_configurations(goal.pose, context.scene, context.thresholds(), start)
-    if len(found.q) == 0:
-        status = no_configuration(goal.pose, context.scene, found, goal.text or "goal")
+    solutions = free_configurations(goal.pose, context.scene, context.thresholds(), start)
+    if len(solutions.q) == 0:
+        status = no_configuration(goal.pose, context.scene, solutions, goal.text or "goal")
         return MovementPlan(
             status, context.journal.info(start, context.joint_names), TrajectoryReport()
         )
-    return plan_to_configurations(start, found.q, context, searches)
+    return plan_to_configurations(start, solutions.q, context, searches)

@@ -79,8 +79,8 @@ def _in_a_hurry(own: Portfolio, exploration: Exploration, context: Context) -> A
     """
     context = context.asking("time")
     best = own.best()
-    found = _explored(exploration, context.valuing_time(_HURRY)).best()
-    hurried = _as_asked(found, context)[0]
+    hasty = _explored(exploration, context.valuing_time(_HURRY)).best()
+    hurried = _as_asked(hasty, context)[0]
     if hurried is None or (best is not None and hurried[1].cost > _NEAR * best[1].cost):
         return None
     method, movement = hurried
@@ -127,14 +127,14 @@ def best_found(exploration: Exploration, context: Context) -> tuple[Answer | Non
     """The best answer by the searches and descents of the request and of its companions, and the
     shortest duration [s] met where none is as short as requested.
     """
-    own = _explored(exploration, context)
+    portfolio = _explored(exploration, context)
     options = context.options
     if options.planner_id:
-        return own.best(), own.refinement.shortest
+        return portfolio.best(), portfolio.refinement.shortest
     if options.duration > 0.0:
-        return _of_duration(own, exploration, context)
-    compared = _Comparison(context, own)
-    compared.consider_companions(options.objective, own, exploration)
+        return _of_duration(portfolio, exploration, context)
+    compared = _Comparison(context, portfolio)
+    compared.consider_companions(options.objective, portfolio, exploration)
     best = compared.best
     if options.objective == "energy" and best is not None:
         best = best[0], _least_over_durations(best[1], context)
@@ -181,15 +181,15 @@ def _least_over_durations(best: Movement, context: Context) -> Movement:
         for factor in _OTHER_DURATIONS:
             while best is begin or steps < _DURATION_STEPS:
                 duration = factor * best.trajectory.duration
-                found = (
+                candidate = (
                     None
                     if duration > DURATION_MAX
                     else near(best, context.asking("energy", duration))
                 )
                 steps += 1
-                if found is None or found.cost >= best.cost:
+                if candidate is None or candidate.cost >= best.cost:
                     break
-                best = replace(found, context=context)
+                best = replace(candidate, context=context)
             if best is not begin:
                 break
         notes.append(f"{begin.trajectory.duration:.3f} s became {best.trajectory.duration:.3f} s")
@@ -272,15 +272,15 @@ def _as_asked(found: Answer | None, context: Context) -> tuple[Answer | None, fl
     """
     if found is None:
         return None, np.inf
-    method, other = found
-    own = other.trajectory.duration
+    method, movement_found = found
+    duration = movement_found.trajectory.duration
     requested = context.options.duration
-    movement = other.asked_by(context)
+    movement = movement_found.asked_by(context)
     if requested > 0.0:
-        if own > requested * (1.0 + DURATION_SLACK):
-            return None, own
-        movement = movement.stretched_by(max(requested / own, 1.0))
-    return ((method, movement) if movement.prove().certified else None), own
+        if duration > requested * (1.0 + DURATION_SLACK):
+            return None, duration
+        movement = movement.stretched_by(max(requested / duration, 1.0))
+    return ((method, movement) if movement.prove().certified else None), duration
 
 
 def _cheaper(best: Answer | None, other: Answer | None) -> Answer | None:
@@ -312,13 +312,15 @@ def with_own_laws(synchronous: Movement, context: Context) -> Movement:
         if _too_late(context):
             notes.append(LATE)
             return synchronous
-        own = _own(synchronous, context)
-        if own is None or not (_as_named(context) or own.cost <= synchronous.cost):
+        asynchronous = _own(synchronous, context)
+        if asynchronous is None or not (
+            _as_named(context) or asynchronous.cost <= synchronous.cost
+        ):
             notes.append(SYNCHRONOUS)
             return synchronous
-        notes.append(own.note or "each joint has its own law")
-        context.journal.timing = own.timing
-        return own
+        notes.append(asynchronous.note or "each joint has its own law")
+        context.journal.timing = asynchronous.timing
+        return asynchronous
 
 
 def _too_late(context: Context) -> bool:

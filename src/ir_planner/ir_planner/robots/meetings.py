@@ -47,12 +47,12 @@ class Meetings:
         """Activities of two robots that could meet with these movements; where a stop could, so
         could the movements beside it.
         """
-        found: Cells = {}
-        for a, one in enumerate(movements[0]):
-            for b, other in enumerate(movements[1]):
-                for cell in self._of_pair(arms, (a, b), (one, other)):
-                    found.update((each, set()) for each in _with_neighbours(cell, arms))
-        return found
+        cells: Cells = {}
+        for a, first in enumerate(movements[0]):
+            for b, second in enumerate(movements[1]):
+                for cell in self._of_pair(arms, (a, b), (first, second)):
+                    cells.update((cell_near, set()) for cell_near in _with_neighbours(cell, arms))
+        return cells
 
     def _of_pair(
         self, arms: tuple[ArmProgram, ArmProgram], at: Pair, pair: tuple[Movement, Movement]
@@ -90,8 +90,8 @@ class Meetings:
     def _apart(self, one: SweptArm, other: SweptArm) -> bool:
         key = id(one), id(other)
         if key not in self._free:
-            found = meeting(one, other, self.margin - PROOF_TOLERANCE)
-            self._free[key] = found.verdict == FREE
+            closest = meeting(one, other, self.margin - PROOF_TOLERANCE)
+            self._free[key] = closest.verdict == FREE
         return self._free[key]
 
 
@@ -135,7 +135,7 @@ def hand_over_cells(arms: tuple[ArmProgram, ArmProgram], robots: tuple[int, int]
     """Movements of two robots that parts between them order, by the places where one of them puts
     a part down and the other one takes it up.
     """
-    found: Cells = {}
+    cells: Cells = {}
     for giver, taker in ((0, 1), (1, 0)):
         for part, station, left, taken in _hand_overs(arms[giver], arms[taker]):
             lying = _lying(arms[giver], part, station)
@@ -149,8 +149,8 @@ def hand_over_cells(arms: tuple[ArmProgram, ArmProgram], robots: tuple[int, int]
             for gives, takes in pairs:
                 cell = (2 * gives + 1, 2 * takes + 1)
                 key = cell if giver == 0 else cell[::-1]
-                found.setdefault(key, set()).add(robots[taker])
-    return found
+                cells.setdefault(key, set()).add(robots[taker])
+    return cells
 
 
 def _hand_overs(giver: ArmProgram, taker: ArmProgram) -> Iterator[tuple[str, str, int, int]]:

@@ -61,16 +61,16 @@ class Drives:
         available. Raises RequestError for parameters of another robot, and for a voltage that does
         not reach full speed.
         """
-        own = self.parameters
-        if own is None:
+        parameters = self.parameters
+        if parameters is None:
             return self._within(robot)
-        if (own.robot, own.joints) != (robot.name, robot.joint_names):
+        if (parameters.robot, parameters.joints) != (robot.name, robot.joint_names):
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"power parameters {own.name!r} are of robot {own.robot!r}: the cell has "
-                f"{robot.name!r}",
+                f"power parameters {parameters.name!r} are of robot {parameters.robot!r}: "
+                f"the cell has {robot.name!r}",
             )
-        return self._within(own.robot_with(robot))
+        return self._within(parameters.robot_with(robot))
 
     def _within(self, robot: RobotModel) -> RobotModel:
         """The robot with the torque that current and voltage leave, where these bound it."""
@@ -148,9 +148,9 @@ class PlanningScene:
 
     def leaving(self, torque_reserve: float) -> "PlanningScene":
         """The same with another share of the torque for the feedback; what is computed stays."""
-        other = replace(self, drives=replace(self.drives, torque_reserve=torque_reserve))
-        other.__dict__.update({**self.__dict__, "drives": other.drives})
-        return other
+        scene = replace(self, drives=replace(self.drives, torque_reserve=torque_reserve))
+        scene.__dict__.update({**self.__dict__, "drives": scene.drives})
+        return scene
 
     @property
     def load_text(self) -> str:
@@ -278,17 +278,19 @@ class PlanningScene:
         """By the place of each uncertain centre of mass among the parameters: dynamics with it on
         both sides of where it is, CENTRE_STEP apart.
         """
-        own = self.parameters
-        places = range(len(own.names))[own.centre_places()]
-        found = {}
-        for k in (k for k in places if own.deviation[k] > 0.0):
-            step = 0.5 * CENTRE_STEP * np.eye(len(own.mean))[k]
-            sides = [replace(own, mean=own.mean + side * step) for side in (-1.0, 1.0)]
+        parameters = self.parameters
+        places = range(len(parameters.names))[parameters.centre_places()]
+        moved = {}
+        for k in (k for k in places if parameters.deviation[k] > 0.0):
+            step = 0.5 * CENTRE_STEP * np.eye(len(parameters.mean))[k]
+            sides = [
+                replace(parameters, mean=parameters.mean + side * step) for side in (-1.0, 1.0)
+            ]
             robots = [side.robot_with(self.cell.robot) for side in sides]
             pose = self.cell.base_pose
             less, more = (DynamicsModel(robot, self._attached, pose) for robot in robots)
-            found[k] = (less, more)
-        return found
+            moved[k] = (less, more)
+        return moved
 
     @cached_property
     def unloaded(self) -> DynamicsModel:
@@ -345,16 +347,16 @@ class PlanningScene:
 
     def _contacts(self, station: Stops) -> tuple[AllowedContact, ...]:
         if not isinstance(station, str):
-            return tuple(contact for one in station for contact in self._contacts(one))
+            return tuple(contact for stop_name in station for contact in self._contacts(stop_name))
         if not station:
             return ()
         try:
             return self.cell.contacts_at(station)
         except LookupError:
-            known = [stop.name for stop in self.cell.stations] + [
+            names = [stop.name for stop in self.cell.stations] + [
                 path.name for path in self.cell.paths
             ]
-            raise unknown_name("station", station, known) from None
+            raise unknown_name("station", station, names) from None
 
     def zone_of(self, station: str) -> Zone | None:
         """The forbidden zone of the machine of a station or a path, in the world; None: it has

@@ -52,21 +52,21 @@ def pareto_front(known: list[Movement], context: Context) -> tuple[Movement, ...
     """
     points = list(known)
 
-    def descend(start: Movement, asked: Context) -> Movement | None:
+    def descend(start: Movement, context_of_front: Context) -> Movement | None:
         if context.work.exhausted:
             return None
-        rounds = 1 if asked.options.duration > 0.0 else 3
+        rounds = 1 if context_of_front.options.duration > 0.0 else 3
         try:
-            found = Descents(asked).improved(start.trajectory, rounds=rounds)
+            improved = Descents(context_of_front).improved(start.trajectory, rounds=rounds)
         except RequestError:  # longer than a movement may be
             return None
-        if found is not None:
-            points.append(found)
-        return found
+        if improved is not None:
+            points.append(improved)
+        return improved
 
     fastest = context.asking("time")
-    for asked in (at_the_mains(context), fastest):
-        descend(points[0], asked)
+    for context_of_front in (at_the_mains(context), fastest):
+        descend(points[0], context_of_front)
     ends = non_dominated(points)
     neighbour = ends[-1]
     between = portable.geomspace(ends[0].report.duration, ends[-1].report.duration, COUNT)[1:-1]
@@ -87,16 +87,16 @@ def non_dominated(points: list[Movement]) -> tuple[Movement, ...]:
 
 def thinned(front: tuple[Movement, ...]) -> tuple[Movement, ...]:
     """A front without points that hardly differ from the one before; both ends stay."""
-    kept = list(front[:1])
+    points = list(front[:1])
     for point in front[1:]:
-        last = kept[-1].report
+        last = points[-1].report
         longer = point.report.duration / last.duration
         cheaper = point.report.energy / last.energy
         if longer >= _APART[0] or cheaper <= _APART[1]:
-            kept.append(point)
+            points.append(point)
         elif point is front[-1]:
-            kept[1:] = [*kept[1:-1], point]
-    return tuple(kept)
+            points[1:] = [*points[1:-1], point]
+    return tuple(points)
 
 
 POINTS_MAX = 10_000
@@ -217,19 +217,19 @@ class _Optimization:
             return self._answer(blocked)
         if np.abs(goal - start).max() < STILL:
             return self._standing()
-        known = [self.original] if self._within_options(self.original) else []
+        candidates = [self.original] if self._within_options(self.original) else []
         found = self._optimised()
-        if found is None and not self._fits(known):
+        if found is None and not self._fits(candidates):
             status, found = self._rerouted()
             if found is None:
                 return self._answer(status)
-        known += [found] if found is not None else []
+        candidates += [found] if found is not None else []
         with self.journal.stage("pareto front") as notes:
-            first = sorted(known, key=lambda movement: movement is not found)
+            first = sorted(candidates, key=lambda movement: movement is not found)
             front = pareto_front(first, self.context)
             shown = thinned(front)
             notes.append(f"{len(shown)} of {len(front)} movements")
-        best = min(self._fits([*known, *front]), key=self._cost)
+        best = min(self._fits([*candidates, *front]), key=self._cost)
         if best is self.original:
             what = "energy" if self.options.duration > 0.0 else self.options.objective
             self.journal.note("result", f"the original is kept: nothing better by {what} was found")
@@ -238,12 +238,12 @@ class _Optimization:
     def _optimised(self) -> Movement | None:
         """The best certified movement near the original."""
         with self.journal.stage("descent") as notes:
-            found = self.descents.improved(self.original.trajectory, self._shortcut())
-            notes.append("certified" if found else "nothing certified")
-            if found is None and self.options.duration > 0.0:
-                found = self._fastest_stretched()
-                notes.append("the fastest one, stretched" if found else "nor is the fastest one")
-        return found
+            movement = self.descents.improved(self.original.trajectory, self._shortcut())
+            notes.append("certified" if movement else "nothing certified")
+            if movement is None and self.options.duration > 0.0:
+                movement = self._fastest_stretched()
+                notes.append("the fastest one, stretched" if movement else "nor is the fastest one")
+        return movement
 
     def _fastest_stretched(self) -> Movement | None:
         """The fastest movement near the original, stretched to the requested duration.
@@ -282,8 +282,8 @@ class _Optimization:
         self.journal.planner_id = ""
         start = self.path[0]
         goal = self.path[-1]
-        status, found = search_regional(start, goal, self.context.at(""), self.searches)
-        if found is None:
+        status, movement = search_regional(start, goal, self.context.at(""), self.searches)
+        if movement is None:
             why = (
                 f"the original can't be repaired ({self.wrong})"
                 if self.wrong
@@ -291,7 +291,7 @@ class _Optimization:
             )
             return Status(status.code, f"{why}; {status.message}"), None
         self.journal.note("result", "not the original's path but a new one between its end points")
-        return status, found
+        return status, movement
 
     def _within_options(self, movement: Movement) -> bool:
         """Whether a movement is certified and within the scalings."""

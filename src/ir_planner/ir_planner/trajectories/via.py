@@ -71,15 +71,15 @@ def passed(
     times = np.union1d(np.linspace(0.0, trajectory.duration, count), trajectory.times)
     q = trajectory.sample(times).q
     poses = scene.chain.tcp_poses(q) if via.distance > 0.0 else None
-    found: list[float] = []
+    instants: list[float] = []
     first = 0
     for place in places:
         near = _near(q, poses, place, via, scene)[first:]
         if not near.any():
             return None
         first += int(np.argmax(near))
-        found.append(float(times[first]))
-    return found
+        instants.append(float(times[first]))
+    return instants
 
 
 def _near(
@@ -125,11 +125,11 @@ class ViaSearch:
         journal = self.context.journal
         journal.planner_id = "via"
         journal.timing = "synchronous"
-        status, found = self.search()
+        status, movement = self.search()
         info = journal.info(self.start, self.context.joint_names)
-        if found is None:
+        if movement is None:
             return MovementPlan(status, info, TrajectoryReport())
-        return MovementPlan(status, info, found.report, found.trajectory, found.path)
+        return MovementPlan(status, info, movement.report, movement.trajectory, movement.path)
 
     def search(self) -> tuple[Status, Movement | None]:
         """The cheapest movement that is found, None where the status says why there is none."""
@@ -171,10 +171,10 @@ class ViaSearch:
     def _lasting(self, movement: Movement) -> Movement | None:
         """A movement at the requested duration; None where it takes longer."""
         requested = self.context.options.duration
-        own = movement.trajectory.duration
+        duration = movement.trajectory.duration
         if requested == 0.0:
             return movement
-        return movement.stretched_by(requested / own) if own <= requested else None
+        return movement.stretched_by(requested / duration) if duration <= requested else None
 
     def _too_short(self, stopping: Movement) -> RequestError:
         check_requested(stopping.trajectory.duration, self.context)
@@ -187,10 +187,10 @@ class ViaSearch:
         scene = self.context.scene
         layers = [self.start[None]]
         for k, place in enumerate((*self.via.places, self.goal)):
-            found = self._configurations(place, k, layers[-1][0])
-            if isinstance(found, Status):
-                return found
-            layers.append(found)
+            configurations = self._configurations(place, k, layers[-1][0])
+            if isinstance(configurations, Status):
+                return configurations
+            layers.append(configurations)
         cost = np.zeros(1)
         back = []
         for before, after in pairwise(layers):
@@ -214,10 +214,10 @@ class ViaSearch:
             )
             return q[None]
         assert place.pose is not None  # a Goal has one of both
-        found = free_configurations(place.pose, context.scene, context.thresholds(), near)
-        if len(found.q) == 0:
-            return no_configuration(place.pose, context.scene, found, place.text or what)
-        return np.asarray(found.q[:_CONFIGURATIONS])
+        solutions = free_configurations(place.pose, context.scene, context.thresholds(), near)
+        if len(solutions.q) == 0:
+            return no_configuration(place.pose, context.scene, solutions, place.text or what)
+        return np.asarray(solutions.q[:_CONFIGURATIONS])
 
     def _legs(self, chain: FloatArray) -> list[Movement] | Status:
         """The movements from place to place, with a stop at each."""
@@ -267,7 +267,7 @@ class ViaSearch:
         context = self.context
         space = FreeSpace.of(context.scene, context.safety_distance, context.work)
         pulled = self._pulled(chain)
-        found: list[Movement] = []
+        movements: list[Movement] = []
         steps = (distinct(np.concatenate([leg.path for leg in legs])), pulled)
         makers: list[tuple[str, Callable[[], Movement]]] = [
             ("blended", partial(straight_steps, points, context))
@@ -289,9 +289,9 @@ class ViaSearch:
             except (TimingError, RequestError) as error:
                 self.context.journal.reject(f"{name}: {error}")
                 continue
-            found.append(movement)
+            movements.append(movement)
             yield name, movement
-        serving = [movement for movement in found if self._serves(movement, chain)]
+        serving = [movement for movement in movements if self._serves(movement, chain)]
         for movement in sorted(serving, key=lambda movement: movement.cost)[:1]:
             better = Descents(self.context).improved(movement.trajectory, rounds=1)
             if better is not None:
@@ -317,12 +317,12 @@ class ViaSearch:
             along = evenly_spaced(path_of(leg.trajectory, self.context.scene), per_leg + 2)
             points += [along[1:-1], leg.trajectory.positions[-1:]]
         flat = np.concatenate(points)
-        kept = [0]
+        indices = [0]
         for k in range(1, len(flat)):
-            if np.abs(flat[k] - flat[kept[-1]]).max() >= _SMALL:
-                kept.append(k)
-        kept[-1] = len(flat) - 1
-        return np.asarray(flat[kept])
+            if np.abs(flat[k] - flat[indices[-1]]).max() >= _SMALL:
+                indices.append(k)
+        indices[-1] = len(flat) - 1
+        return np.asarray(flat[indices])
 
     def _serves(self, movement: Movement, chain: FloatArray) -> bool:
         """Whether a movement is certified, passes all places, and is as long as requested."""
