@@ -127,7 +127,14 @@ def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
     return np.asarray(pinocchio.rpy.rpyToMatrix(roll, pitch, yaw))
 
 
-@pytest.mark.parametrize(("seed", "meshes"), [(1, False), (2, False), (3, True), (4, True)])
+@pytest.mark.parametrize(
+    ("seed", "meshes"),
+    [
+        (1, False),
+        (3, True),
+        *(pytest.param(*each, marks=pytest.mark.long) for each in ((2, False), (4, True))),
+    ],
+)
 def test_a_drawn_urdf_is_where_pinocchio_has_it_and_never_farther_apart(
     seed: int, meshes: bool, tmp_path: Path
 ) -> None:
@@ -204,7 +211,9 @@ def test_angles_of_few_digits_move_points_by_no_more_than_is_said(
     assert any(f"by at most {1e6 * arm.rounding:.2g} um" in note for note in arm.notes)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(
+    "seed", [1, *(pytest.param(seed, marks=pytest.mark.long) for seed in (2, 3))]
+)
 def test_a_home_leaves_room_to_every_pair_also_to_those_near_by_construction(
     seed: int, tmp_path: Path
 ) -> None:
@@ -218,7 +227,7 @@ def test_a_home_leaves_room_to_every_pair_also_to_those_near_by_construction(
     assert room.min() > 0.9 * min(min(each) for each in ROOMS)
 
 
-@pytest.mark.parametrize("seed", [1, 3, *(pytest.param(k, marks=pytest.mark.long) for k in (2, 4))])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=pytest.mark.long) for k in (2, 3, 4))])
 def test_meshes_meet_in_no_allowed_posture_but_where_they_are_built_so(
     seed: int, tmp_path: Path
 ) -> None:

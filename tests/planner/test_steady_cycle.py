@@ -70,7 +70,14 @@ def faults(problem: SteadyProblem, cycle: SteadyCycle) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize(("machines", "seed"), [(2, 0), (2, 1), (2, 2), (3, 0), (3, 1)])
+@pytest.mark.parametrize(
+    ("machines", "seed"),
+    [
+        (2, 0),
+        (3, 0),
+        *(pytest.param(*each, marks=pytest.mark.long) for each in ((2, 1), (2, 2), (3, 1))),
+    ],
+)
 @pytest.mark.parametrize("over", [1.0001, 1.3])
 def test_brute_force_over_all_orders_and_modes_agrees(
     machines: int, seed: int, over: float
@@ -83,7 +90,7 @@ def test_brute_force_over_all_orders_and_modes_agrees(
     assert faults(problem, cycle) == []
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_brute_force_agrees_with_a_buffer_between_two_machines(seed: int) -> None:
     """A place where a part only lies, and where there is none the next one may be put."""
     problem = drawn(seed, 3, 3)
@@ -94,7 +101,10 @@ def test_brute_force_agrees_with_a_buffer_between_two_machines(seed: int) -> Non
     assert faults(problem, cycle) == []
 
 
-@pytest.mark.parametrize(("seed", "machines"), [(0, 3), (1, 3), (0, 4), (1, 4)])
+@pytest.mark.parametrize(
+    ("seed", "machines"),
+    [(0, 3), *(pytest.param(*each, marks=pytest.mark.long) for each in ((1, 3), (0, 4), (1, 4)))],
+)
 def test_brute_force_agrees_for_cycles_of_two_parts(seed: int, machines: int) -> None:
     problem = roomy(seed, machines, (1,) * machines, (0,) * machines)
     period = 1.02 * shortest(problem)
@@ -125,7 +135,7 @@ def roomy(
     )
 
 
-@pytest.mark.parametrize("seed", [6, 7])
+@pytest.mark.parametrize("seed", [6, pytest.param(7, marks=pytest.mark.long)])
 @pytest.mark.parametrize(("capacities", "buffers"), ROOM)
 @pytest.mark.parametrize("units", [1, 2])
 def test_brute_force_agrees_where_machines_hold_several_parts(
@@ -146,7 +156,9 @@ def test_two_parts_a_cycle_can_be_cheaper_than_one() -> None:
     assert cheapest(problem, period, 2).joules / 2.0 < 0.95 * one
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in (1, 2))]
+)
 @pytest.mark.parametrize("units", [1, 2])
 def test_more_room_in_a_machine_never_makes_the_cycle_dearer(seed: int, units: int) -> None:
     problem = roomy(seed, 3, (1, 1, 1), (0, 0, 0))
@@ -162,7 +174,7 @@ def test_more_room_in_a_machine_never_makes_the_cycle_dearer(seed: int, units: i
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_brute_force_agrees_for_four_machines(seed: int) -> None:
     problem = drawn(seed, 4, 3)
     period = 1.05 * shortest(problem)

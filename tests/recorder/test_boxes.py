@@ -181,9 +181,13 @@ PAGES: dict[str, Callable[[Analysis], str]] = {
     "statistics": statistics,
     "layout": layout,
 }
+LATER = ("parts", "recordings", "arena", "statistics")  # only in the long tests
 
 
-@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.long) if name in LATER else name for name in PAGES],
+)
 def test_nothing_is_cut_overlaps_or_scrolls_and_axe_finds_nothing(
     browser: Any,
     analysis: Analysis,

@@ -114,7 +114,7 @@ def test_no_corrupted_recording_is_taken_without_a_word(seed: int, kind: str) ->
     assert doubted(CORRUPTIONS[kind](drawn_meter(seed)))
 
 
-@pytest.mark.parametrize("steps", [-30, 12])
+@pytest.mark.parametrize("steps", [-30, pytest.param(12, marks=pytest.mark.long)])
 def test_a_meter_whose_clock_is_off_is_told_with_the_seconds_to_add(steps: int) -> None:
     samples = metered(2)
     said = doubted(replace(samples, watts=np.roll(samples.watts, steps)))
