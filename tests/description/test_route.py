@@ -103,6 +103,31 @@ def test_a_process_that_no_route_visits_is_found() -> None:
     assert finding.sentence == "has a process of 12 s, but the cell has no route"
 
 
+@given(capacity=st.integers(1, 4), buffer=st.integers(0, 4))
+@settings(max_examples=10)
+def test_room_in_a_machine_survives_its_file_and_changes_no_movement(
+    capacity: int, buffer: int
+) -> None:
+    machines = tuple(
+        replace(machine, capacity=capacity, buffer=buffer) if machine.name == "lathe" else machine
+        for machine in FLEXIBLE.equipment
+    )
+    cell = replace(FLEXIBLE, equipment=machines)
+    again = cell_from_yaml(cell_to_yaml(cell)).machine("lathe")
+    assert (again.capacity, again.buffer) == (capacity, buffer)
+    assert cell_hash(cell) == cell_hash(FLEXIBLE)
+
+
+@pytest.mark.parametrize("line", ["capacity: 0", "capacity: 5", "capacity: 1.5", "buffer: -1"])
+def test_room_that_makes_no_sense_is_refused(line: str) -> None:
+    text = cell_to_yaml(FLEXIBLE)
+    key = line.split(":")[0]
+    before, after = text.split("process:", 1)
+    indent = before.rsplit("\n", 1)[1]
+    with pytest.raises(CellFileError, match=key):
+        cell_from_yaml(f"{before}{line}\n{indent}process:{after}")
+
+
 @given(
     times=st.one_of(
         st.lists(st.floats(1.0, 500.0), min_size=1, max_size=5).map(ProcessTimes.of),

@@ -22,6 +22,7 @@ from ir_description import (
 )
 from ir_msgs_py.report import PlannedMovement
 from ir_planner import Planner, RequestError, SteadyPlan
+from ir_planner.flexible.steady_plan import machine_bars
 
 CELL = load_cell("flexible")
 PAGE = Path(__file__).parents[2] / "docs" / "flexible.md"
@@ -44,6 +45,49 @@ def at_thirty() -> SteadyPlan:
     """The plan that most tests look at, with its saving and two cycles of a run."""
     planner = Planner(CELL, clock=lambda: 0.0)
     return planner.plan_steady_cycle(parts_per_hour=30.0, saving=True, cycles=2)
+
+
+@cache
+def roomy_at(parts_per_hour: float) -> SteadyPlan:
+    """With a lathe that works on two parts at once."""
+    machines = tuple(
+        replace(machine, capacity=2) if machine.name == "lathe" else machine
+        for machine in CELL.equipment
+    )
+    planner = Planner(replace(CELL, equipment=machines), clock=lambda: 0.0)
+    return planner.plan_steady_cycle(parts_per_hour=parts_per_hour)
+
+
+def test_a_lathe_for_two_parts_is_twice_as_soon_and_no_dearer() -> None:
+    plan = roomy_at(45.0)
+    assert plan.cycle is not None
+    assert plan.cycle.period <= 80.0 + ROUNDING < at_thirty().fastest
+    assert plan.joules < at_thirty().joules
+    assert plan.gap < 1.0
+    assert plan.program is None
+    assert plan.several == "lathe holds 2 parts"
+
+
+def test_bars_of_a_machine_are_its_work_and_no_more_parts_than_it_works_on() -> None:
+    plan = roomy_at(45.0)
+    assert plan.cycle is not None
+    bars = machine_bars(plan)
+    for name, capacity in (("lathe", 2), ("washer", 1), ("gauge", 1)):
+        seconds = CELL.machine(name).process
+        assert sum(length for _, length in bars[name]) == pytest.approx(seconds)
+        for moment in np.linspace(0.0, plan.cycle.period, 500):
+            working = sum(begin < moment < begin + length for begin, length in bars[name])
+            assert working <= capacity
+
+
+def test_a_schedule_alone_has_no_run() -> None:
+    machines = tuple(
+        replace(machine, capacity=2) if machine.name == "lathe" else machine
+        for machine in CELL.equipment
+    )
+    planner = Planner(replace(CELL, equipment=machines))
+    with pytest.raises(RequestError, match="lathe holds 2 parts"):
+        planner.plan_steady_cycle(parts_per_hour=45.0, cycles=2)
 
 
 def test_every_movement_is_certified_and_the_robot_is_back_where_it_began() -> None:

@@ -16,7 +16,13 @@ from ir_cli.output import Columns, Row, number, print_csv, print_json, print_tab
 from ir_cli.planning import failed, options_of, planner_of, predicted, sentences
 from ir_description import Cell, cell_to_yaml
 from ir_planner import Planner, ProgramPlan, SteadyPlan
-from ir_planner.flexible import SHARES, counted_times, outage_replay, with_counted_times
+from ir_planner.flexible import (
+    SHARES,
+    counted_times,
+    cycle_steps,
+    outage_replay,
+    with_counted_times,
+)
 from ir_recorder.report.files import write_output
 from ir_studies.cells import tended_instance, written
 from ir_studies.errors import StudyError
@@ -97,17 +103,9 @@ def run_steady(arguments: argparse.Namespace, report: Report) -> int:
             units=arguments.units,
             cycles=arguments.cycles,
         )
-    if plan.cycle is None or plan.program is None or plan.cell is None:
+    if plan.cycle is None:
         return failed(plan.status.message)
-    for output in arguments.output:
-        if output.suffix in PICTURES:
-            sys.stderr.write(f"ir: {_written(plan, output, front=arguments.front)}\n")
-    cell = plan.run_cell or plan.cell
-    program = plan.run or plan.program
-    planner.set_cell(cell)
-    for output in arguments.output:
-        if output.suffix not in PICTURES:
-            report(output, program, planner)
+    _write(plan, planner, arguments, report)
     rows = _rows(plan)
     front = [asdict(point) for point in plan.front]
     if arguments.json:
@@ -129,6 +127,25 @@ def run_steady(arguments: argparse.Namespace, report: Report) -> int:
     return 0
 
 
+def _write(
+    plan: SteadyPlan, planner: Planner, arguments: argparse.Namespace, report: Report
+) -> None:
+    """Write all outputs. Raises InputError for one that a schedule alone doesn't have."""
+    if plan.several and any(output.suffix != ".png" for output in arguments.output):
+        raise InputError(f"there is a schedule alone, to be written as .png: {plan.several}")
+    for output in arguments.output:
+        if output.suffix in PICTURES:
+            sys.stderr.write(f"ir: {_written(plan, output, front=arguments.front)}\n")
+    program = plan.run or plan.program
+    cell = plan.run_cell or plan.cell
+    if program is None or cell is None:
+        return
+    planner.set_cell(cell)
+    for output in arguments.output:
+        if output.suffix not in PICTURES:
+            report(output, program, planner)
+
+
 def _check(arguments: argparse.Namespace) -> None:
     """Raise InputError for what doesn't belong to a steady cycle."""
     if (arguments.outage or arguments.vary) and not arguments.cycles:
@@ -148,10 +165,10 @@ def _check(arguments: argparse.Namespace) -> None:
 
 def _written(plan: SteadyPlan, path: Path, *, front: bool) -> Path:
     """Write the cell with the program of the cycle, or the chart (front: of the front)."""
-    cell = plan.run_cell or plan.cell
-    assert cell is not None
     try:
         if path.suffix == ".yaml":
+            cell = plan.run_cell or plan.cell
+            assert cell is not None
             return write_output(path, cell_to_yaml(cell).encode(), _CELL, ANYWHERE)
         if path.suffix == ".xml":
             return write_output(path, written([tended_instance(plan)]).encode(), _XML, ANYWHERE)
@@ -165,7 +182,20 @@ def _written(plan: SteadyPlan, path: Path, *, front: bool) -> Path:
 
 def _rows(plan: SteadyPlan) -> list[Row]:
     """One row per step of the cycle, SI units."""
-    assert plan.program is not None
+    if plan.program is None:
+        return [
+            {
+                "begin": step.start,
+                "seconds": step.seconds,
+                "joules": np.nan,
+                "what": f"{step.kind} {step.from_station} {step.to_station}",
+                "mode": step.power_mode,
+                "wait_for": "",
+                "set_signals": "",
+                "load": "",
+            }
+            for step in cycle_steps(plan)
+        ]
     rows: list[Row] = []
     begin = 0.0
     for step in plan.program.movements:
@@ -189,20 +219,20 @@ def _rows(plan: SteadyPlan) -> list[Row]:
 def _totals(plan: SteadyPlan) -> Row:
     """Figures of the cycle."""
     assert plan.cycle is not None
-    assert plan.program is not None
-    report = plan.program.report
+    report = None if plan.program is None else plan.program.report
+    units = plan.cycle.units
     return {
-        "program_id": plan.program.program_id,
+        "program_id": "" if plan.program is None else plan.program.program_id,
         "parts_per_hour": HOUR / plan.cycle.seconds_per_part,
         "period": plan.cycle.period,
         "units": plan.cycle.units,
         "fastest_period": plan.fastest,
         "order": [plan.machines[visit.activity] for visit in plan.cycle.visits],
         "joules": plan.joules,
-        "joules_low": report.energy_low / plan.cycle.units,
-        "joules_high": report.energy_high / plan.cycle.units,
+        "joules_low": None if report is None else report.energy_low / units,
+        "joules_high": None if report is None else report.energy_high / units,
         "gap": plan.gap,
-        "certified": report.certified,
+        "certified": report is not None and report.certified,
         "planning_seconds": plan.info.planning_time,
         "truncated": plan.info.truncated,
     }
@@ -211,20 +241,11 @@ def _totals(plan: SteadyPlan) -> Row:
 def _sentences(plan: SteadyPlan) -> list[str]:
     """The totals for people."""
     totals = _totals(plan)
-    assert plan.program is not None
-    report = replace(
-        plan.program.report,
-        energy=totals["joules"],
-        energy_low=totals["joules_low"],
-        energy_high=totals["joules_high"],
-    )
-    proof = "free of collision and within all limits at every instant, proved"
     lines = [
         f"order: a part from {', '.join(totals['order'])}, each to the next station of the route",
         f"{totals['parts_per_hour']:.2f} parts an hour, a cycle of {totals['period']:.2f} s "
         f"(the shortest: {totals['fastest_period']:.2f} s)",
-        f"{totals['joules'] / 1e3:.2f} kJ a part from the mains, predicted: "
-        f"{predicted(report)}; {proof if totals['certified'] else 'NOT certified'}",
+        f"{totals['joules'] / 1e3:.2f} kJ a part from the mains, {_proved(plan, totals)}",
         f"at most {totals['gap']:.2f} % above the cheapest cycle of these configurations, without "
         "what the capacitor carries from one movement to the next",
     ]
@@ -239,6 +260,23 @@ def _sentences(plan: SteadyPlan) -> list[str]:
     if plan.saving is not None:
         lines.append(f"saving: {plan.saving.sentence}")
     return lines
+
+
+def _proved(plan: SteadyPlan, totals: Row) -> str:
+    """How sure the joules are, and what is proved of the movements."""
+    if plan.program is None:
+        return (
+            "predicted; a schedule of movements that are proved among parts at all other places, "
+            f"no program: {plan.several}"
+        )
+    report = replace(
+        plan.program.report,
+        energy=totals["joules"],
+        energy_low=totals["joules_low"],
+        energy_high=totals["joules_high"],
+    )
+    proof = "free of collision and within all limits at every instant, proved"
+    return f"predicted: {predicted(report)}; {proof if totals['certified'] else 'NOT certified'}"
 
 
 # Surprises, on the schedule alone.

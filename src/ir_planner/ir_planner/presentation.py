@@ -152,9 +152,9 @@ def plot_cycle(
     title: str,
 ) -> Any:
     """Gantt chart of a cycle. robot: name, begin, length [s] and kind of what it does; machines:
-    begin and length [s] of their work; below, the mean power of each step.
+    begin and length [s] of their work; below, the mean power of each step where there are any.
     """
-    figure, (chart, power) = _figure(2)
+    figure, (chart, *below) = _figure(2 if movements else 1)
     figure.suptitle(title, wrap=True, fontsize="medium")
     figure.set_size_inches(11, 6)
     rows = ["robot", *machines]
@@ -167,8 +167,11 @@ def plot_cycle(
         chart.broken_barh(list(works), (row - 0.4, 0.8), color=_WORKING, edgecolor="white")
     chart.set_yticks(range(len(rows)), rows)
     chart.invert_yaxis()
-    _power_bars(power, movements)
-    chart.sharex(power)
+    if not below:
+        chart.set_xlabel("time [s]")
+    for power in below:
+        _power_bars(power, movements)
+        chart.sharex(power)
     return figure
 
 

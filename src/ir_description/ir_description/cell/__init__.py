@@ -19,6 +19,7 @@ from ir_description.cell.cell import (
 )
 from ir_description.cell.equipment import (
     APPROACH_MAX,
+    CAPACITY_MAX,
     CONFIGURATION_SEARCHES,
     PROCESS_MAX,
     SAMPLES_MAX,
@@ -66,6 +67,7 @@ __all__ = [
     "APPROACH_MAX",
     "AUTO",
     "BODIES_MAX",
+    "CAPACITY_MAX",
     "CONFIGURATION_SEARCHES",
     "NUMBER_MAX",
     "PAUSE_MAX",

@@ -33,6 +33,8 @@ PROCESS_MAX = 86_400.0
 """Longest process of a machine [s]: a day."""
 SAMPLES_MAX = 10_000
 """Most samples of a process."""
+CAPACITY_MAX = 4
+"""Most parts that a machine works on at once, and most that its buffer holds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,8 +152,9 @@ class Equipment:
 
     A body that no state names is always there; one that states name is there in these states only.
     Where there is a switch, `state` is the one that plans assume and that counts until its signal
-    is heard. process [s]: how long it works on a part as plans count, 0: it doesn't; it holds one
-    part at a time. process_times: where that varies.
+    is heard. process [s]: how long it works on a part as plans count, 0: it doesn't. process_times:
+    where that varies. capacity: parts that it works on at once, each for itself; buffer: how many
+    more it holds, which wait for its work or to be taken, first in, first out.
     """
 
     name: str
@@ -164,10 +167,14 @@ class Equipment:
     switch: StateSwitch | None = None
     process: float = 0.0
     process_times: ProcessTimes | None = None
+    capacity: int = 1
+    buffer: int = 0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", frozen_pose(self.pose, f"pose of {self.name}"))
         in_range(self.process, 0.0, PROCESS_MAX, "s", f"process of {self.name}")
+        in_range(self.capacity, 1, CAPACITY_MAX, "parts", f"capacity of {self.name}")
+        in_range(self.buffer, 0, CAPACITY_MAX, "parts", f"buffer of {self.name}")
         names = {body.name for body in self.bodies}
         if len(names) != len(self.bodies):
             raise InvalidValueError(f"equipment {self.name} names a body twice")

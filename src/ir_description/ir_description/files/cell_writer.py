@@ -142,6 +142,10 @@ def _machine(machine: Equipment, stations: list[Station]) -> Iterator[str]:
         yield f"switch: {_switch(machine.switch)}"
     if machine.process:
         yield f"process: {_process(machine)}"
+    if machine.capacity > 1:
+        yield f"capacity: {machine.capacity}"
+    if machine.buffer > 0:
+        yield f"buffer: {machine.buffer}"
     yield "bodies:" if machine.bodies else "bodies: []"
     yield from _entries([_body(body)] for body in machine.bodies)
     yield from _block("stations", (_station(station) for station in stations))
@@ -351,7 +355,7 @@ def cell_hash(cell: Cell) -> str:
 
 
 def _unswitched(machine: Equipment) -> Equipment:
-    machine = replace(machine, process=0.0, process_times=None)
+    machine = replace(machine, process=0.0, process_times=None, capacity=1, buffer=0)
     if machine.switch is None:
         return machine
     return replace(machine, state=machine.states[0].name, switch=None)

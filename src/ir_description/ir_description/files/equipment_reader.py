@@ -14,6 +14,7 @@ import numpy as np
 from ir_description.cell import (
     APPROACH_MAX,
     BODIES_MAX,
+    CAPACITY_MAX,
     CONFIGURATION_SEARCHES,
     PROCESS_MAX,
     SAMPLES_MAX,
@@ -282,7 +283,18 @@ def _size(table: Table, kind: str) -> FloatArray:
     return lengths
 
 
-_MACHINE_KEYS = ("pose", "zone", "states", "state", "switch", "enabled", "process", "stations")
+_MACHINE_KEYS = (
+    "pose",
+    "zone",
+    "states",
+    "state",
+    "switch",
+    "enabled",
+    "process",
+    "capacity",
+    "buffer",
+    "stations",
+)
 STATES_MAX = 20
 """Most states of a part that one station takes."""
 _SEARCH_KEYS = ("configurations", "starts", "withdrawal")
@@ -305,6 +317,8 @@ def read_equipment(item: Item, bodies: BodyReader) -> tuple[Equipment, list[tupl
         switch=_switch(table["switch"], states) if "switch" in table else None,
         process=process,
         process_times=times,
+        capacity=table["capacity"].integer(1, CAPACITY_MAX) if "capacity" in table else 1,
+        buffer=table["buffer"].integer(0, CAPACITY_MAX) if "buffer" in table else 0,
     )
     items = table["stations"].list(0, 10_000) if "stations" in table else []
     stations = [_station(station, machine) for station in items]

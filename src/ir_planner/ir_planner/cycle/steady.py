@@ -195,7 +195,8 @@ class Visit:
 @dataclass(frozen=True)
 class SteadyCycle:
     """visits: in order, the first one starts at 0 s; joules: of the cycle, on the curves; bound:
-    what no cycle within the period that was asked for can be below; units: parts a cycle.
+    what no cycle within the period that was asked for can be below; units: parts a cycle. full:
+    parts in each machine when it begins.
     """
 
     visits: tuple[Visit, ...]
@@ -203,6 +204,20 @@ class SteadyCycle:
     units: int
     joules: float
     bound: float
+    full: tuple[int, ...]
+
+    @property
+    def most(self) -> tuple[int, ...]:
+        """Parts that each machine holds at most."""
+        inside = list(self.full)
+        most = list(self.full)
+        for visit in self.visits:
+            if visit.activity > 0:
+                inside[visit.activity - 1] -= 1
+            if visit.activity < len(inside):
+                inside[visit.activity] += 1
+                most[visit.activity] = max(most[visit.activity], inside[visit.activity])
+        return tuple(most)
 
     @property
     def seconds_per_part(self) -> float:
@@ -227,7 +242,7 @@ class SteadyCycle:
             for visit in self.visits
         )
         return SteadyCycle(
-            visits, units * self.period, units, units * self.joules, units * self.bound
+            visits, units * self.period, units, units * self.joules, units * self.bound, self.full
         )
 
 
@@ -319,6 +334,7 @@ class _Model:
     ) -> None:
         self.problem = problem
         self.units = units
+        self.full = tuple(full)
         self.most = period
         self.price = 0.0 if fastest else 1.0
         self.program = LinearProgram()
@@ -331,9 +347,9 @@ class _Model:
         self.lags += [self._lag((a, u), a, u + 1, self._travel[a, a]) for a, u in self.nodes]
         self.possible = self.least <= self.most and self._windows()
         if self.possible:
-            self._build(full, fastest=fastest)
+            self._build(fastest=fastest)
 
-    def _build(self, full: Sequence[int], *, fastest: bool) -> None:
+    def _build(self, *, fastest: bool) -> None:
         problem = self.problem
         self.period = self.program.variable(self.least, self.most, cost=float(fastest))
         self.start = {
@@ -356,7 +372,7 @@ class _Model:
         self._half()
         for lag in self.lags:
             self._apart(lag)
-        for machine, parts in enumerate(full):
+        for machine, parts in enumerate(self.full):
             self._queue(machine, parts)
             self._at_once(machine, parts)
 
@@ -596,7 +612,7 @@ class _Model:
             )
             node = following[node]
         period = float(values[self.period])
-        cycle = SteadyCycle(tuple(visits), period, self.units, answer.cost, answer.bound)
+        cycle = SteadyCycle(tuple(visits), period, self.units, answer.cost, answer.bound, self.full)
         return cycle, answer.bound
 
     def _waited(self, where: str, node: Node, values: FloatArray) -> tuple[ModeWait, ...]:

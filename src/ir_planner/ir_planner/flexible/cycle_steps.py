@@ -317,7 +317,7 @@ class CycleSteps:
             again.append(Visit(visit.activity, visit.unit, here, *lengths[k], before, ()))
             here += sum(lengths[k])
         period = max(period, self._cycle.period)
-        return SteadyCycle(tuple(again), period, self._cycle.units, np.nan, np.nan)
+        return replace(self._cycle, visits=tuple(again), period=period, joules=np.nan)
 
     def _lengths(
         self, choice: Choice, found: Mapping[HopPart, Movement]

@@ -58,6 +58,8 @@ _LONGEST_WAIT = 86_400.0  # s: no wait of a cycle is longer
 _ROUNDING = 1e-6  # s: of the linear program
 _SLACK = 1.0005  # of the shortest period: the first point of the front
 _SAME = 1e-9  # s
+_CONTENTS_MAX = 2000  # ways in which machines can be full: a linear program each
+_ROUNDS = 20  # cycles after which a machine's queue is what it always is
 
 
 @dataclass(frozen=True)
@@ -100,14 +102,25 @@ class SteadyPlan:
     front: tuple[CyclePoint, ...] = field(default=())
 
     @property
+    def several(self) -> str:
+        """Which machines hold several parts at once, in words; "" for none."""
+        most = () if self.cycle is None else self.cycle.most
+        held = zip(self.machines[1:-1], most, strict=False)
+        return ", ".join(f"{name} holds {parts} parts" for name, parts in held if parts > 1)
+
+    @property
     def joules(self) -> float:
-        """Joules a part, with what the capacitor carries from one movement to the next."""
-        if self.cycle is None or self.program is None:
+        """Joules a part; of a program with what the capacitor carries from one movement to the
+        next.
+        """
+        if self.cycle is None:
             return np.nan
+        if self.program is None:
+            return self.cycle.joules_per_part
         return self.program.report.energy / self.cycle.units
 
     def __repr__(self) -> str:
-        if self.cycle is None or self.program is None:
+        if self.cycle is None:
             return f"SteadyPlan({self.status.message})"
         return (
             f"SteadyPlan({self.cycle.units * HOUR / self.cycle.period:.1f} parts an hour, "
@@ -117,9 +130,10 @@ class SteadyPlan:
 
     def plot(self) -> Any:
         """Robot, machines and power over a cycle; a matplotlib figure."""
-        if self.cycle is None or self.program is None:
+        if self.cycle is None:
             return plot_cycle((), {}, (), repr(self))
-        return plot_cycle(robot_bars(self), machine_bars(self), self.program.movements, repr(self))
+        steps = () if self.program is None else self.program.movements
+        return plot_cycle(robot_bars(self), machine_bars(self), steps, repr(self))
 
     def plot_front(self) -> Any:
         """Joules a part over parts an hour; a matplotlib figure."""
@@ -181,6 +195,23 @@ def robot_bars(plan: SteadyPlan) -> tuple[tuple[str, float, float, str], ...]:
     return tuple(bars)
 
 
+def _process_begins(plan: SteadyPlan, place: int) -> list[float]:
+    """When the machine at a place begins with the parts of a cycle [s]: when it has them, and is
+    finished with one of those before that it works on at once.
+    """
+    assert plan.cycle is not None
+    assert plan.problem is not None
+    loads = [v.start + v.seconds for v in plan.cycle.visits if v.activity == place - 1]
+    capacity = plan.problem.capacity[place - 1]
+    begins: list[float] = []
+    for round_ in range(_ROUNDS):
+        for load in loads:
+            here = round_ * plan.cycle.period + load
+            free = begins[-capacity] + plan.process[place - 1] if len(begins) >= capacity else here
+            begins.append(max(here, free))
+    return begins[-len(loads) :]
+
+
 def machine_bars(plan: SteadyPlan) -> dict[str, tuple[tuple[float, float], ...]]:
     """When each machine works in the cycle: begin and length [s]; over its end it goes on at its
     begin.
@@ -188,17 +219,18 @@ def machine_bars(plan: SteadyPlan) -> dict[str, tuple[tuple[float, float], ...]]
     assert plan.cycle is not None
     period = plan.cycle.period
     bars: dict[str, tuple[tuple[float, float], ...]] = {}
-    for visit in sorted(plan.cycle.visits, key=lambda each: each.activity):
-        place = visit.activity + 1
-        if place > len(plan.process):
-            continue
-        seconds = plan.process[place - 1]
+    for place, seconds in enumerate(plan.process, 1):
         if seconds == 0.0:
             continue
-        begin = (visit.start + visit.seconds) % period
-        before = min(seconds, period - begin)
-        rest = ((0.0, seconds - before),) if seconds > before else ()
-        bars[plan.machines[place]] = ((begin, before), *rest)
+        pieces: list[tuple[float, float]] = []
+        for begin in _process_begins(plan, place):
+            begin %= period
+            left = seconds
+            while left > 0.0:
+                pieces.append((begin, min(left, period - begin)))
+                left -= pieces[-1][1]
+                begin = 0.0
+        bars[plan.machines[place]] = tuple(pieces)
     return bars
 
 
@@ -244,27 +276,56 @@ def plan_steady_cycle(
             )
         model, chosen = ways.cheapest(max(period, fastest * _SLACK), units)
         notes.append(f"{chosen.cycle.period:.2f} s, {chosen.cycle.joules:.0f} J")
-    request = model.request
-    tending = model.tending
-    try:
-        made = CycleSteps(request, tending, chosen.cycle, chosen.movements, context)
-    except StageError as failed:
-        return SteadyPlan(failed.status, journal.info(request.start, context.joint_names))
     plan = SteadyPlan(
         status=Status.success(),
         info=journal.info(request.start, context.joint_names),
         parts_per_hour=parts_per_hour,
-        stations=tending.route.visits,
-        machines=machines_of(request.cell),
+        stations=model.tending.route.visits,
+        machines=machines_of(model.request.cell),
         process=model.problem.process,
         problem=model.problem,
         cycle=chosen.cycle,
-        request=made.request,
         gap=chosen.gap,
         fastest=fastest,
-        cell=made.cell,
-        program=program_of(made.steps),
     )
+    if max(chosen.cycle.most) > 1:
+        _refuse_program(plan, saving=saving, cycles=cycles)
+    else:
+        try:
+            plan = _with_program(plan, model, chosen, context, saving=saving, cycles=cycles)
+        except StageError as failed:
+            return SteadyPlan(failed.status, journal.info(request.start, context.joint_names))
+    if front_points:
+        with journal.stage("front"):
+            plan = replace(plan, front=_front(ways, fastest, front_points, units))
+    return replace(plan, info=journal.info(request.start, context.joint_names))
+
+
+def _refuse_program(plan: SteadyPlan, *, saving: bool, cycles: int) -> None:
+    """Raise RequestError where more than a schedule is asked for."""
+    asked = "saving" if saving else "cycles" if cycles else ""
+    if asked:
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"{asked} needs a program, and there is a schedule alone: {plan.several}",
+        )
+
+
+def _with_program(
+    plan: SteadyPlan,
+    model: _TendingModel,
+    chosen: _Chosen,
+    context: Context,
+    *,
+    saving: bool,
+    cycles: int,
+) -> SteadyPlan:
+    """The plan with its program, and what was asked for beside it. Raises StageError where a
+    movement isn't free in the scene in which it is driven.
+    """
+    journal = context.journal
+    made = CycleSteps(model.request, model.tending, chosen.cycle, chosen.movements, context)
+    plan = replace(plan, request=made.request, cell=made.cell, program=program_of(made.steps))
     if saving:
         with journal.stage("saving"):
             held = made.saving(Spreads(made.request))
@@ -272,17 +333,10 @@ def plan_steady_cycle(
             said = replace(held.parts, program_id=own.program_id, sentence=held.sentence)
             plan = replace(plan, saving=held, program=replace(own, savings=said))
     if cycles:
-        try:
-            with journal.stage("run"):
-                run_cell, steps = made.run(cycles)
-        except StageError as failed:
-            info = journal.info(request.start, context.joint_names)
-            return replace(plan, status=failed.status, info=info)
+        with journal.stage("run"):
+            run_cell, steps = made.run(cycles)
         plan = replace(plan, run=program_of(steps), run_cell=run_cell)
-    if front_points:
-        with journal.stage("front"):
-            plan = replace(plan, front=_front(ways, fastest, front_points, units))
-    return replace(plan, info=journal.info(request.start, context.joint_names))
+    return plan
 
 
 @dataclass(frozen=True, eq=False)
@@ -314,12 +368,23 @@ class _TendingModel:
             name: wait_modes(rests_at(node.departure, scene, times))
             for name, node in tending.nodes.items()
         }
+        machines = [cell.machine(name) for name in machines_of(cell)[1:-1]]
+        self._room = [np.inf, *(each.capacity + each.buffer for each in machines), np.inf]
+        ways = np.prod([1.0 + room for room in self._room[1:-1]])
+        if ways > _CONTENTS_MAX:
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"the machines of the route can hold parts in {ways:.0f} ways, at most "
+                f"{_CONTENTS_MAX} are planned: give fewer a capacity or a buffer",
+            )
         self.problem = SteadyProblem(
             activities=tuple(self._activity(a) for a in range(len(visits) - 1)),
             hops={arc: tending.columns[key].curve for arc, key in self._hops().items()},
             after=tuple(modes[name] for name in visits[1:]),
             before=tuple(modes[name] for name in visits[:-1]),
-            process=tuple(cell.machine(name).process for name in machines_of(cell)[1:-1]),
+            process=tuple(machine.process for machine in machines),
+            capacities=tuple(machine.capacity for machine in machines),
+            buffers=tuple(machine.buffer for machine in machines),
         )
 
     def _handled(self, request: ProgramRequest, place: int) -> tuple[float, float]:
@@ -347,7 +412,7 @@ class _TendingModel:
             (a, b): (ACROSS, self.visits[a + 1], self.visits[b], False)
             for a in range(count)
             for b in range(count)
-            if b not in (a, a + 1)
+            if b not in (a, a + 1) or (a == b and min(self._room[a : a + 2]) > 1)
         }
 
     def fastest(self, units: int) -> SteadyCycle:
