@@ -17,6 +17,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from ir_cli.robot_from_urdf import RobotSource, made_robot
+from ir_description import Capsule
 from ir_description.files.solid_mesh import read_solid
 from ir_kernels import Chain
 
@@ -193,26 +194,42 @@ def misread_robot(path: Path, arm: Arm, more: bool, rng: np.random.Generator) ->
             balls.append(((frames[6] @ [0.05, 0.1, 0.0, 1.0])[:3], 0.02))
         for number, (centre, radius) in enumerate(balls):
             link = min(number, 6)
-            depth = max(
-                _depth(centre, poses[row, each.link], each)
-                for each in robot.capsules
-                if each.link == link
+            points = centre + radius * _BALL
+            depth = np.max(
+                [
+                    _depth(points, poses[row, each.link], each)
+                    for each in robot.capsules
+                    if each.link == link
+                ],
+                axis=0,
             )
-            if depth < radius - INSIDE - 1e-6 * radius:
-                out = radius - depth
+            if depth.min() < -INSIDE - 1e-6 * radius:
+                out = -depth.min()
                 return f"ball {number} stands out of the capsules of link {link} by {out:.3g} m"
     if not np.allclose(robot.position_max, 2.5, atol=1e-5):
         return "limits are others"
     return ""
 
 
-def _depth(point: np.ndarray, pose: np.ndarray, capsule: object) -> float:
-    """How deep [m] a point lies in a capsule of a link."""
-    a, b = (pose[:3, :3] @ np.asarray(end) + pose[:3, 3] for end in (capsule.p0, capsule.p1))  # type: ignore[attr-defined]
+def _directions() -> np.ndarray:
+    """Points (N, 3) all over a ball of radius 1, on its surface and at half its depth."""
+    turn = np.pi * (1.0 + np.sqrt(5.0)) * np.arange(300)
+    z = 1.0 - 2.0 * (np.arange(300) + 0.5) / 300
+    beside = np.sqrt(1.0 - z**2)
+    surface = np.stack([beside * np.cos(turn), beside * np.sin(turn), z], axis=1)
+    return np.concatenate([surface, 0.5 * surface, np.zeros((1, 3))])
+
+
+_BALL = _directions()
+
+
+def _depth(points: np.ndarray, pose: np.ndarray, capsule: Capsule) -> np.ndarray:
+    """How deep [m] points (N, 3) lie in a capsule of a link (N,)."""
+    a, b = (pose[:3, :3] @ end + pose[:3, 3] for end in (capsule.p0, capsule.p1))
     along = b - a
     square = float(along @ along)
-    share = float(np.clip((point - a) @ along / square, 0.0, 1.0)) if square else 0.0
-    return float(capsule.radius - np.linalg.norm(point - a - share * along))  # type: ignore[attr-defined]
+    share = np.clip((points - a) @ along / square, 0.0, 1.0) if square else np.zeros(len(points))
+    return capsule.radius - np.linalg.norm(points - a - np.outer(share, along), axis=1)
 
 
 def solid(rng: np.random.Generator) -> np.ndarray:

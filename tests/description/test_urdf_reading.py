@@ -79,6 +79,9 @@ HOSTILE = (
     ('<parent link="base_link"/>', '<parent link="l6"/>', "carries itself|hang on no joint"),
     ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><mimic joint="j2"/>', "joint j1 mimics j2"),
     ('name="l2"', 'name="l1"', "link l1 is there twice"),
+    ("</geometry>", '</geometry><geometry><box size="1 1 1"/></geometry>', "has 2 <geometry>"),
+    ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><axis xyz="0 1 0"/>', "joint j1 has 2 <axis>"),
+    ('xyz="0 0 0.4"', 'xyz="0 0 0.4" quat_xyzw="0 0 1 0"', "joint j1 has an orientation as quat"),
     ('<limit lower="-2.5" upper="2.5" effort="900" velocity="3"/>', "", "and has no <limit>"),
     ("<link name=\"tool0\"/>", '<link name="tool0"/><link name="alone"/>', "hang on no joint"),
 )  # fmt: skip
@@ -135,6 +138,37 @@ FINGER = (
     '<link name="{0}"/><joint name="j{0}" type="revolute"><parent link="hand"/><child link="{0}"/>'
     '<axis xyz="0 0 1"/><limit lower="0" upper="0.5"/></joint>'
 )
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        "<self_collision_checking>{}</self_collision_checking>",
+        '<gazebo reference="l6"><collision><geometry>{}</geometry></collision></gazebo>',
+        "<group><link name='g'><collision><geometry>{}</geometry></collision></link></group>",
+    ],
+)
+@pytest.mark.parametrize("kind", SHAPES)
+def test_a_shape_that_is_none_of_a_link_is_named_with_its_line(kind: str, place: str) -> None:
+    text = arm_text().replace("</robot>", f"\n{place.format(SHAPES[kind])}</robot>")
+    line = text[: text.index(SHAPES[kind])].count("\n") + 1
+    arm = urdf_arm(text, "arm.urdf")
+    assert any(f"the {kind} in <" in each and f"(line {line})" in each for each in arm.notes)
+
+
+@pytest.mark.parametrize("limit", ["", '<limit lower="-0.1" upper="0.2"/>'])
+def test_a_follower_reaches_what_it_is_driven_to_whatever_its_own_limits_say(limit: str) -> None:
+    """j6 turns from -2.5 to 2.5 rad."""
+    extra = (
+        f'<link name="f"><collision><geometry>{SHAPES["box"]}</geometry></collision></link>'
+        '<joint name="jf" type="continuous"><parent link="l6"/><child link="f"/>'
+        f'<axis xyz="0 1 0"/><mimic joint="j6" multiplier="-0.5" offset="0.2"/>{limit}</joint>'
+    )
+    arm = urdf_arm(arm_text(extra), "arm.urdf")
+    (motion,) = arm.links[6].shapes[-1].motions
+    assert (motion.lower, motion.upper) == pytest.approx((-1.05, 1.45))
+    assert arm.leaders == {"j6"}
+    assert any("jf (continuous, follows j6) leads to no flange" in note for note in arm.notes)
 
 
 def test_fingers_behind_the_sixth_axis_are_no_seventh_axis() -> None:

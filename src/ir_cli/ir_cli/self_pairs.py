@@ -2,9 +2,11 @@
 
 Neighbours are left out: their bodies meet at the joint. Others that are near in many postures are
 near by construction: they keep a distance of their own, so that capsules that are wider than the
-bodies leave the robot its work. It is never below what the capsules were seen to be apart in a
-posture in which what they stand for meets: each piece of a link's surface stands for one capsule,
-the narrowest that holds it. Triangles of both surfaces tell whether they meet.
+bodies leave the robot its work. It is never below what the capsules are apart in a posture in which
+what they stand for meets: each piece of a link's surface stands for one capsule, the narrowest that
+holds it. That is proved for all postures within the limits, by triangles of both surfaces and by
+how far these can move in a box of postures. Only links that meet in every posture, as a shaft does
+in its housing, are let off where they do so all around.
 """
 
 from __future__ import annotations
@@ -47,16 +49,15 @@ _SMALL = 200_000  # triangles of a link that is looked at more closely
 _ALONG = 20  # points along a body that is a capsule
 _TOUCH = 1e-9  # m: of rounding, by which a corner may be out of its capsule
 _HALVINGS = 16
-_LOOKED_AT = 48  # postures, in a round around those that meet
+_LOOKED_AT = 48  # postures at once
 _TRIED = 500  # postures in which capsules overlap, but by no more than usual
-_DEEPER = 60  # in which they overlap by more
-_FROM = 8  # postures that meet, around which others are looked at
-_AROUND = 24
-_STEPS = (0.06, 0.03, 0.015, 0.008)  # of the range of each joint
+_GAP = 1e-3  # m: within which what a pair keeps is found
+_POSTURES_MAX = 20_000  # looked at to find it
 _NEAREST = 5e-4  # m: surfaces that are nearer count as meeting
 _ROUGHLY = 2e-3  # m: the same where rings are counted
-_BOXES = 300_000_000  # pairs, after which two capsules count as if their surfaces met
-_COUNTED = 16  # postures in which rings are counted
+_BOXES = 100_000_000  # pairs, after which what is left counts as if the surfaces met
+_ALWAYS = 300  # postures: links that meet in all of them are built so
+_COUNTED = 16  # of them, in which rings are counted
 
 
 class Pairs(NamedTuple):
@@ -104,12 +105,14 @@ def pairs_of(
     unclear: set[tuple[int, int]] = set()
     least = np.full(len(model.pairs), SAFETY)
     for links, near in groups.items():
-        rings = _Rings(chain, *links, surfaces, q[:_COUNTED])
+        rings = _Rings(chain, *links, surfaces, q)
         own = []
         for z in near:
             pair = (named[name] for name in model.pairs[z][1:])
             lower, upper = sorted(pair, key=lambda each: each.link)
-            own.append(_own_distance(distance[:, z], _Meeting(chain, lower, upper, rings, q)))
+            own.append(
+                _own_distance(distance[:, z], _Meeting(chain, lower, upper, rings, q, (low, high)))
+            )
         kept = np.array([each for each, _ in own])
         least[near] = kept
         left = float((distance[:, near] > kept).all(axis=1).mean())
@@ -134,15 +137,13 @@ def _own_distance(distance: FloatArray, meeting: _Meeting) -> tuple[float, str]:
         return usual, reason
     least = meeting.largest_distance(usual)
     if meeting.built_so:
-        reason += f"; the bodies of the URDF meet in most postures: {meeting.built_so}"
+        reason += f"; the links meet in all of {_ALWAYS} postures: {meeting.built_so}"
+    whose = "the other parts of their bodies" if meeting.built_so else "the bodies of the URDF"
     if least <= usual:
-        return usual, (
-            f"{reason}; the bodies of the URDF were not seen to meet where the capsules overlap by "
-            "less: they come no nearer than in nine of ten postures"
-        )
+        return usual, f"{reason}; {whose} meet nowhere beyond: it is proved"
     return least, (
-        f"{reason}; the bodies of the URDF meet, or are too near to tell, in postures in which the "
-        "capsules overlap by more"
+        f"{reason}; {whose} meet up to there, or are too near to tell, and nowhere beyond: it is "
+        "proved"
     )
 
 
@@ -194,21 +195,55 @@ class _Pieces(NamedTuple):
         return _Pieces(*joined)
 
 
-class _Piecewise:
-    """A surface in pieces."""
+class _Part(NamedTuple):
+    """Triangles (T, 3, 3) that stand for what is within `beside` [m] of them, in pieces of a size
+    of `step` [m]; 0: each is one.
+    """
 
-    def __init__(self, pieces: _Pieces) -> None:
-        self.pieces = pieces
-        self.surface = Surface(pieces.triangles, pieces.beside)
+    triangles: FloatArray
+    beside: float
+    step: float
+
+
+class _Piecewise:
+    """A surface of parts, and as pieces where these are asked for."""
+
+    def __init__(self, parts: Sequence[_Part]) -> None:
+        self._parts = parts
+        self.triangles = np.concatenate([np.zeros((0, 3, 3)), *(each.triangles for each in parts)])
+        self.beside = np.repeat(
+            [each.beside for each in parts], [len(each.triangles) for each in parts]
+        ).astype(np.float64)
+        self.surface = Surface(self.triangles, self.beside)
+
+    @cached_property
+    def pieces(self) -> _Pieces:
+        """All of it."""
+        found = _Pieces.none()
+        for part in self._parts:
+            found = found.and_of(
+                _voxels(part.triangles, part.step, part.beside)
+                if part.step
+                else _Pieces.balls(part.triangles[:, 0], part.beside)
+            )
+        return found
+
+    @cached_property
+    def _fine(self) -> Surface:
+        return Surface(self.pieces.triangles, self.pieces.beside)
 
     def of_pieces(self, which: BoolArray) -> Surface:
         """The pieces (N,) alone."""
         rows = which[self.pieces.piece]
         return Surface(self.pieces.triangles[rows], self.pieces.beside[rows])
 
+    def meets(self, other: _Piecewise, pose: FloatArray) -> bool:
+        """Whether it meets another surface, or nearly does; pose (1, 4, 4): of this one in it."""
+        return bool(self.surface.meets(other.surface, pose, _NEAREST, _BOXES)[0][0])
+
     def touching(self, other: _Piecewise, pose: FloatArray) -> IntArray:
         """Pieces that nearly meet another surface; pose: of this one in the other one."""
-        return np.unique(self.pieces.piece[self.surface.touching(other.surface, pose, _ROUGHLY)])
+        return np.unique(self.pieces.piece[self._fine.touching(other.surface, pose, _ROUGHLY)])
 
 
 class _Surfaces:
@@ -241,28 +276,30 @@ class _Surfaces:
         """
         if capsule.name not in self._known:
             own = self.capsules(capsule.link)
-            for each, pieces in zip(own, self._shared(own), strict=True):
-                self._known[each.name] = _Piecewise(pieces)
+            for each, parts in zip(own, self._shared(own), strict=True):
+                self._known[each.name] = _Piecewise(parts)
         return self._known[capsule.name]
 
-    def _shared(self, capsules: Sequence[Capsule]) -> list[_Pieces]:
-        """Pieces of the surface of a link whose capsules are given, for each of them."""
-        found = [_Pieces.none() for _ in capsules]
+    def _shared(self, capsules: Sequence[Capsule]) -> list[list[_Part]]:
+        """Parts of the surface of a link whose capsules are given, for each of them."""
+        found: list[list[_Part]] = [[] for _ in capsules]
         for body in self._bodies[capsules[0].link]:
             wider = body.beside + self._rounding
             if body.exact is not None:
                 p0, p1, ball, _ = body.exact
                 half = 0.5 / (_ALONG - 1) * float(np.linalg.norm(p1 - p0))
-                balls = _Pieces.balls(np.linspace(p0, p1, _ALONG), ball + half + wider)
-                k = _holder(balls.at, ball, capsules)
-                found[k] = found[k].and_of(balls)
+                along = np.linspace(p0, p1, _ALONG if half > 0.0 else 1)
+                points = np.repeat(along[:, None], 3, axis=1)
+                k = _holder(along, ball, capsules)
+                found[k].append(_Part(points, ball + half + wider, 0.0))
                 continue
             for k, share in enumerate(_shared_out(body.triangles, capsules)):
                 size = float(np.linalg.norm(capsules[k].p1 - capsules[k].p0))
                 step = (size + 2.0 * capsules[k].radius) / _VOXELS
                 if capsules[k].link in self._finer:
                     step = min(step, max(_FINE, _coarse_enough(share)))
-                found[k] = found[k].and_of(_voxels(share, step, wider))
+                if len(share):
+                    found[k].append(_Part(share, wider, step))
         return found
 
 
@@ -336,16 +373,32 @@ class _Rings:
     """Rings about the joint that leads from a link towards another one, in which their surfaces
     meet by construction, as a shaft in its housing: what turns in something meets it all around.
 
-    q (N, n): the postures in which they are counted.
+    q (N, n): postures, in the first of which they are counted.
     """
 
     def __init__(
         self, chain: Chain, first: int, second: int, surfaces: _Surfaces, q: FloatArray
     ) -> None:
+        self._every = q[:_ALWAYS]
         self.surfaces = surfaces
         self._chain = chain
         self._links = (first, second)
-        self._q = q
+        self._q = q[:_COUNTED]
+
+    @cached_property
+    def always(self) -> bool:
+        """Whether the links meet, or nearly do, in every posture."""
+        sides = [
+            [self.surfaces.of(each) for each in self.surfaces.capsules(link)]
+            for link in self._links
+        ]
+        pairs = [*itertools.product(*sides)]
+        for pose in _relative(self._chain, *self._links, self._every)[:, :1]:
+            met = next((k for k, (a, b) in enumerate(pairs) if a.meets(b, pose)), None)
+            if met is None:
+                return False
+            pairs.insert(0, pairs.pop(met))  # most likely to do so again
+        return True
 
     def away(self, side: int, pieces: _Pieces) -> BoolArray:
         """Which pieces (N,) of the first link, or of the second, lie beside no ring that is built
@@ -417,7 +470,9 @@ class _Meeting:
         other: Capsule,
         rings: _Rings,
         q: FloatArray,
+        limits: tuple[FloatArray, FloatArray],
     ) -> None:
+        low, high = limits
         self._chain = chain
         self._capsules = (one, other)
         self._model = CollisionModel(chain, (one, other), (), [(one.name, other.name)])
@@ -425,23 +480,24 @@ class _Meeting:
         self._joints = np.arange(one.link, other.link)
         self._rings = rings
         self._surfaces = (rings.surfaces.of(one), rings.surfaces.of(other))
-        fewer = int(np.argmin([len(each.pieces.triangles) for each in self._surfaces]))
+        fewer = int(np.argmin([len(each.triangles) for each in self._surfaces]))
         self._counted = {fewer: self._surfaces[fewer].surface}
         self.built_so = ""
         self._left = _BOXES
+        self._range = np.stack([low, high])[:, self._joints]
+        self._reach = self._reaches()
 
     def largest_distance(self, usual: float) -> float:
-        """What the capsules are apart at most [m] where the bodies meet, in all postures that were
-        looked at, most of which keep `usual` [m]: -inf where they never do, 0 for links without
-        bodies.
+        """A bound [m] of what the capsules are apart where the bodies meet, most of which keep
+        `usual` [m]: not above it where that suffices, 0 for links without bodies.
         """
         if not all(self._rings.surfaces.has_body(each.link) for each in self._capsules):
             return 0.0
-        if not all(len(each.pieces.at) for each in self._surfaces):
+        if not all(len(each.triangles) for each in self._surfaces):
             return -np.inf
         distance = self._distances(self._q)
-        found = self._found(distance, usual)
-        if float((distance > found).mean()) >= _LEFT:
+        found = self._bound(distance, usual)
+        if float((distance > found).mean()) >= _LEFT or not self._rings.always:
             return found
         away = [self._rings.away(k, each.pieces) for k, each in enumerate(self._surfaces)]
         if all(each.all() for each in away):
@@ -451,66 +507,109 @@ class _Meeting:
             "rings about a joint that do so in all that were counted, and what is within "
             f"{1e3 * _BESIDE:g} mm, are taken for built so"
         )
-        return self._found(distance, usual)
+        return self._bound(distance, usual)
 
-    def _found(self, distance: FloatArray, usual: float) -> float:
-        """The largest distance with what counts of the surfaces; distance (N,) of the capsules."""
+    def _bound(self, distance: FloatArray, usual: float) -> float:
+        """What the capsules are apart at most in a posture in which what counts meets; distance
+        (N,): of the sampled ones.
+
+        Boxes of postures are halved until in none of those left the capsules can be farther apart
+        than found, or nothing can meet: how far anything moves within a box is bounded. What is
+        left after very many counts as if it met.
+        """
+        self._left = _BOXES
+        found = max(usual - _GAP, self._seen(distance, usual))
+        centres = np.mean(self._range, axis=0)[None]
+        half = 0.5 * np.ptp(self._range, axis=0)
+        looked_at = 0
+        while True:
+            q = np.repeat(self._q[:1], len(centres), axis=0)
+            q[:, self._joints] = centres
+            moved = float(half @ self._reach)
+            apart = self._distances(q)
+            open_ = (apart + moved > found + _GAP) & (apart - moved <= 0.0)
+            looked_at += int(open_.sum())
+            if looked_at > _POSTURES_MAX:
+                return min(float(np.max(apart[open_] + moved)), 0.0)
+            open_[open_] = self._meet(q[open_], moved + _NEAREST)
+            meeting = open_ & (apart > found)
+            meeting[meeting] = self._meet(q[meeting], _NEAREST)
+            found = max(found, float(np.max(apart[meeting], initial=found)))
+            open_ &= apart + moved > found + _GAP
+            if not open_.any():
+                return min(found + _GAP, 0.0)
+            longest = int(np.argmax(half * self._reach))
+            step = np.zeros(len(half))
+            step[longest] = 0.5 * half[longest]
+            half = half - step
+            centres = np.concatenate([centres[open_] - step, centres[open_] + step])
+
+    def _seen(self, distance: FloatArray, usual: float) -> float:
+        """The largest distance of sampled postures that meet, above `usual`; else -inf."""
         order = np.argsort(-distance, kind="stable")
-        kept = order[(distance[order] <= 0.0) & (distance[order] > usual)]
-        deeper = order[distance[order] <= usual]
-        tried = np.concatenate([_thinned(kept, _TRIED), _thinned(deeper, _DEEPER)])
-        first = tried[self._first_that_meet(self._q[tried])]
-        if not len(first):
-            return -np.inf
-        return self._climbed(self._q[first], distance[first])
+        tried = _thinned(order[(distance[order] <= 0.0) & (distance[order] > usual)], _TRIED)
+        for begin in range(0, len(tried), _LOOKED_AT):
+            rows = tried[begin : begin + _LOOKED_AT]
+            met = self._meet(self._q[rows], _NEAREST)
+            if met.any():
+                return float(distance[rows[met]].max())
+        return -np.inf
 
-    def _first_that_meet(self, q: FloatArray) -> IntArray:
-        """The first rows of q (N, n) in which the surfaces may meet, _FROM at most."""
-        found: list[int] = []
-        for begin in range(0, len(q), _LOOKED_AT):
-            met = self._meet(q[begin : begin + _LOOKED_AT])
-            found += (begin + np.flatnonzero(met)).tolist()
-            if len(found) >= _FROM:
-                break
-        return np.array(found[:_FROM], dtype=int)
-
-    def _climbed(self, q: FloatArray, distance: FloatArray) -> float:
-        """The largest distance of the capsules in postures near those q (N, n) that meet."""
-        generator = np.random.default_rng(0)
-        span = np.ptp(self._q[:, self._joints], axis=0)
-        for size in _STEPS:
-            near = np.repeat(q, _AROUND, axis=0)
-            step = generator.normal(size=(len(near), len(self._joints)))
-            near[:, self._joints] += size * span * step
-            near = np.clip(near, self._q.min(axis=0), self._q.max(axis=0))
-            apart = self._distances(near)
-            better = (apart > distance.max()) & (apart <= 0.0)
-            if not better.any():
-                continue
-            near = near[better][:_LOOKED_AT]
-            met = self._meet(near)
-            q = np.concatenate([q, near[met]])
-            distance = np.concatenate([distance, apart[better][:_LOOKED_AT][met]])
-            best = np.argsort(-distance, kind="stable")[:_FROM]
-            q = q[best]
-            distance = distance[best]
-        return float(distance.max())
+    def _reaches(self) -> FloatArray:
+        """How far [m/rad] the links move against each other at most where one joint turns (J,)."""
+        poses = self._chain.link_poses(np.zeros((1, self._chain.n)))[0]
+        joints = self._joints
+        axes = np.einsum("jab,jb->ja", poses[joints + 1, :3, :3], self._chain.joint_axis[joints])
+        feet = poses[joints + 1, :3, 3]
+        ends = []
+        for capsule, surface in zip(self._capsules, self._surfaces, strict=True):
+            beside = np.concatenate([np.repeat(surface.beside, 3), [0.0, 0.0]])
+            points = np.concatenate([surface.triangles.reshape(-1, 3), [capsule.p0, capsule.p1]])
+            pose = poses[capsule.link]
+            ends.append((points @ pose[:3, :3].T + pose[:3, 3], beside))
+        lower = _radii(*ends[0], feet, axes)
+        upper = _radii(*ends[1], feet[::-1], axes[::-1])[::-1]
+        return np.minimum(lower, upper)
 
     def _distances(self, q: FloatArray) -> FloatArray:
+        if not len(q):
+            return np.zeros(0)
         return np.asarray(self._model.distances(q)[:, 0])
 
-    def _meet(self, q: FloatArray) -> BoolArray:
-        """Whether the surfaces meet (N,); after very many pairs of boxes they count as if."""
+    def _meet(self, q: FloatArray, near: float) -> BoolArray:
+        """Whether the surfaces are within `near` [m] (N,); after very many pairs of boxes they
+        count as if.
+        """
         result = np.zeros(len(q), dtype=bool)
+        if not len(q):
+            return result
         one, other = (each.link for each in self._capsules)
         poses = _relative(self._chain, one, other, q)
         for side, counted in self._counted.items():
             open_ = np.flatnonzero(~result)
             if len(open_):
                 facing = self._surfaces[1 - side].surface
-                met, looked_at = counted.meets(
-                    facing, poses[open_, side], _NEAREST, max(self._left, 0)
-                )
+                met, looked_at = counted.meets(facing, poses[open_, side], near, max(self._left, 0))
                 result[open_] = met
                 self._left -= looked_at
         return result
+
+
+def _radii(
+    points: FloatArray, beside: FloatArray, feet: FloatArray, axes: FloatArray
+) -> FloatArray:
+    """How far balls around points (N, 3) of radii (N,) [m] on one end of a chain can be from each
+    of its axes (J, 3), through feet (J, 3), the nearest first, whatever angles these have.
+    """
+    found = []
+    for k, (foot, axis) in enumerate(zip(feet, axes, strict=True)):
+        if k == 0:
+            out = points - foot
+            far = float(np.max(np.linalg.norm(np.cross(out, axis), axis=1) + beside))
+            ball = float(np.max(np.linalg.norm(out, axis=1) + beside))
+        else:
+            link = feet[k - 1] - foot
+            far = ball + float(np.linalg.norm(np.cross(link, axis)))
+            ball += float(np.linalg.norm(link))
+        found.append(far)
+    return np.array(found)

@@ -393,8 +393,9 @@ class _Gathering:
     def _say(self, joint: UrdfJoint, motion: SideMotion, bodies: int) -> None:
         unit = "m" if motion.kind == "prismatic" else "rad"
         if bodies:
+            kind = f"{joint.kind}, follows {joint.mimic}" if joint.mimic else joint.kind
             self.notes.append(
-                f"joint {joint.name} ({joint.kind}) leads to no flange and is not planned: its "
+                f"joint {joint.name} ({kind}) leads to no flange and is not planned: its "
                 f"{bodies} {'body fills' if bodies == 1 else 'bodies fill'} everything between "
                 f"{motion.lower:.4g} and {motion.upper:.4g} {unit}, masses stand in its middle"
             )
@@ -416,14 +417,17 @@ class _Gathering:
         return SideMotion(joint.name, joint.child, kind, joint.pose, joint.axis, lower, upper)
 
     def _range(self, joint: UrdfJoint, depth: int = 0) -> tuple[float, float]:
-        """From where to where a joint moves: by its limits, or as what it follows does."""
+        """From where to where a joint moves: by its limits, and as what it follows does."""
+        own = (joint.lower, joint.upper)
         leader = self._joints.get(joint.mimic)
-        if joint.lower < joint.upper or leader is None or depth > len(self._joints):
-            return joint.lower, joint.upper
+        if leader is None or depth > len(self._joints):
+            return own
         if leader.name in self._planned and leader.lower < leader.upper:
             self.leaders.add(leader.name)
         lower, upper = self._range(leader, depth + 1)
         ends = [joint.multiplier * each + joint.offset for each in (lower, upper)]
+        if joint.lower < joint.upper:
+            ends += own
         return min(ends), max(ends)
 
     def _below(self, name: str) -> Iterator[UrdfLink]:

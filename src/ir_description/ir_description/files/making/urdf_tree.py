@@ -7,7 +7,7 @@ every proof of clearance wrong.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from xml.etree import ElementTree as Xml
 from xml.parsers import expat
@@ -177,6 +177,7 @@ class _Reader:
         self._notes: list[str] = []
 
     def tree(self, root: Xml.Element) -> UrdfTree:
+        self._notes += _not_read(root)
         elements = root.findall("link")
         if len(elements) > _LINKS_MAX:
             raise _UrdfError(elements[-1], f"there are {len(elements)} links, must be at most 1000")
@@ -211,6 +212,7 @@ class _Reader:
 
     def _link(self, element: Xml.Element) -> UrdfLink:
         name = _name(element, "link")
+        _check_once(element, ("inertial",), f"link {name}")
         shapes = [self._shape(one, name) for one in element.findall("collision")]
         if not shapes:
             shapes = [self._shape(one, name) for one in element.findall("visual")]
@@ -240,6 +242,8 @@ class _Reader:
 
     def _joint(self, element: Xml.Element) -> UrdfJoint:
         name = _name(element, "joint")
+        once = ("parent", "child", "origin", "axis", "limit", "mimic")
+        _check_once(element, once, f"joint {name}")
         kind = element.get("type", "")
         if kind not in KINDS:
             raise _UrdfError(
@@ -299,10 +303,11 @@ class _Reader:
 
     def _shape(self, element: Xml.Element, link: str) -> UrdfShape:
         """The shape of a <collision> or <visual>. Raises _UrdfError where it isn't known."""
+        what = f"a <{element.tag}> of link {link}"
+        _check_once(element, ("geometry", "origin"), what)
         geometry = element.find("geometry")
         shapes = [] if geometry is None else list(geometry)
         line = getattr(element, "line", 0)
-        what = f"a <{element.tag}> of link {link}"
         if len(shapes) != 1:
             raise _UrdfError(element, f"{what} has {len(shapes)} shapes, must have one")
         (one,) = shapes
@@ -343,6 +348,32 @@ _SIZES: Mapping[str, tuple[str, ...]] = {
     "sphere": ("radius",),
     "capsule": ("radius", "length"),
 }
+
+
+def _check_once(element: Xml.Element, tags: Sequence[str], what: str) -> None:
+    """Raise _UrdfError where an element has another of these: others would read one of both."""
+    for tag in tags:
+        found = element.findall(tag)
+        if len(found) > 1:
+            raise _UrdfError(found[1], f"{what} has {len(found)} <{tag}>, must have at most one")
+
+
+def _not_read(root: Xml.Element) -> Iterator[str]:
+    """A sentence for each shape that belongs to no link, as those of other programs do."""
+    read = {
+        shape
+        for kind in ("collision", "visual")
+        for geometry in root.findall(f"link/{kind}/geometry")
+        for shape in geometry
+    }
+    for parent in root.iter():
+        for shape in parent:
+            if shape.tag in _SIZES and shape not in read:
+                line = getattr(shape, "line", 0)
+                yield (
+                    f"the {shape.tag} in <{parent.tag}> (line {line}) is in no <collision> of a "
+                    "link: it is not read"
+                )
 
 
 def _check_tree(
@@ -394,6 +425,10 @@ def _origin(element: Xml.Element, what: str) -> FloatArray:
     pose = np.eye(4)
     origin = element.find("origin")
     if origin is not None:
+        if "quat_xyzw" in origin.attrib:
+            raise _UrdfError(
+                origin, f"{what} has an orientation as quat_xyzw: write it as rpy (URDF 1.0)"
+            )
         roll, pitch, yaw = np.degrees(_row(origin, "rpy", what, "0 0 0"))
         pose[:3, :3] = rotation_from_abc((yaw, pitch, roll))
         pose[:3, 3] = _row(origin, "xyz", what, "0 0 0")
