@@ -8,8 +8,8 @@ With z = z2, X the displacement of the hand, E4 that of axis 4 and o, z the line
     z . E1^-1 (X o6)             = z . E4 E5 o6             the point of axis 6 nearest to axis 5
 
 Each is a cos q1 + b sin q1 + c = d cos q5 + e sin q5 + f. Where axes 5 and 6 meet, the second has
-no q5 and
-gives q1 first: two angles each. Else q5 is eliminated: a polynomial of degree four in exp(i q1).
+no q5 and gives q1 first: two angles each. Else q5 is eliminated: a polynomial of degree four in
+exp(i q1).
 """
 
 from typing import NamedTuple
@@ -48,6 +48,7 @@ class _Sum(NamedTuple):
         far the cosine is beyond 1 (N,); 0 where any angle does. A cosine up to 1 + slack counts as
         if it were as much below 1.
         """
+        # a cos t + b sin t = hypot(a, b) cos(t - atan2(b, a))
         length = portable.hypot(self.cosine, self.sine)
         any_angle = length < _NOTHING
         ratio = (value - self.constant) / np.where(any_angle, 1.0, length)
@@ -63,7 +64,9 @@ class _Sum(NamedTuple):
 
 
 def _along(to: FloatArray, axis: FloatArray, vector: FloatArray) -> _Sum:
-    """to . rot(axis, angle) vector, of directions (3,) or (N, 3) each."""
+    """to . rot(axis, angle) vector, of directions (3,) or (N, 3) each; by Rodrigues' formula: what
+    lies along the axis stays, what is across turns.
+    """
     along = np.sum(axis * vector, axis=-1, keepdims=True) * axis
     cosine = np.sum(to * (vector - along), axis=-1)
     sine = np.sum(to * np.cross(axis, vector), axis=-1)
@@ -98,6 +101,7 @@ def shoulder_and_wrist(
 def _one_by_one(
     q1: FloatArray, reached: BoolArray, far: FloatArray, aim1: _Sum, aim5: _Sum, slack: float
 ) -> ShoulderPairs:
+    """Where axes 5 and 6 meet: both q5 for each of two q1 (N, 2) that the second equation gave."""
     pairs = []
     for k in (0, 1):
         value = (
@@ -113,7 +117,9 @@ def _one_by_one(
 
 
 def _together(aim1: _Sum, aim5: _Sum, reach1: _Sum, reach5: _Sum, slack: float) -> ShoulderPairs:
-    """M x + m = N y with x, y the unit vectors of q1 and q5: |adj(N) (M x + m)| = |det N|."""
+    """M x + m = N y with x, y the unit vectors of q1 and q5: |adj(N) (M x + m)| = |det N|, as
+    y = adj(N) (M x + m) / det N has length 1. adj rather than the inverse: det N may be 0.
+    """
     N = np.stack([aim5[:2], reach5[:2]]).transpose(2, 0, 1)  # (n, 2, 2)
     scale = np.maximum(np.abs(N).max(axis=2), _NOTHING)  # both rows without a unit
     N = N / scale[:, :, None]
@@ -125,10 +131,14 @@ def _together(aim1: _Sum, aim5: _Sum, reach1: _Sum, reach5: _Sum, slack: float) 
     )
     A = portable.matmul(adj, M)
     a = (portable.matmul(adj, m[:, :, None]))[:, :, 0]
+
+    # q1 from the roots w = exp(i q1); log |w| is how far a root is from the unit circle
     w = _unit_roots(A, a, det)
     beyond = portable.log(np.sqrt((w * w).sum(axis=2)))
     q1 = portable.arctan2(w[..., 1], w[..., 0])
     q1 = q1 + np.where(np.abs(beyond) > NEAR_UNIT, beyond, 0.0)  # a pair that just left the circle
+
+    # q5 from y, of which the sign of det N is all that matters
     x = np.stack([portable.cos(q1), portable.sin(q1)], axis=1)  # (n, 2, 4)
     y = (portable.matmul(A, x) + a[:, :, None]) * np.sign(det)[:, None, None]
     far = np.where(np.abs(beyond) > NEAR_UNIT, np.abs(beyond), 0.0)
@@ -140,6 +150,8 @@ def _unit_roots(A: FloatArray, a: FloatArray, det: FloatArray) -> FloatArray:
     w = exp(i q1), x = (cos q1, sin q1).
     """
     p = 0.5 * A * np.array([1.0, -1.0])  # A x + a = p w + conj(p) / w + a, p as (n, 2, 2)
+    # |p w + a + conj(p) / w|^2 - det^2, times w^2: coefficients of w^4 to w^0, of which the last
+    # two are conjugates of the first two
     sizes = (p * p).sum(axis=1)
     square = np.stack([sizes[:, 0] - sizes[:, 1], 2.0 * (p[:, :, 0] * p[:, :, 1]).sum(axis=1)], 1)
     mixed = 2.0 * (p * a[:, :, None]).sum(axis=1)
@@ -147,6 +159,8 @@ def _unit_roots(A: FloatArray, a: FloatArray, det: FloatArray) -> FloatArray:
     centre = np.stack([middle, np.zeros_like(middle)], axis=1)
     conjugate = np.array([1.0, -1.0])
     rows = np.stack([square, mixed, centre, mixed * conjugate, square * conjugate], axis=1)
+
+    # where the first coefficient vanishes the degree is lower: a tiny one sends a root far away
     lengths = np.sqrt((rows * rows).sum(axis=2))
     size = lengths.max(axis=1)
     nothing = lengths[:, 0] < 1e-14 * np.maximum(size, 1e-300)

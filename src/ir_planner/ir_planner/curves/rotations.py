@@ -23,9 +23,9 @@ def rotation_of(vectors: FloatArray) -> FloatArray:
     angle = np.sqrt(square)
     small = angle < _SMALL
     safe = np.where(small, 1.0, angle)
-    half = np.where(
-        small, 0.5 - square / 48.0 + (square * square) / 3840.0, portable.sin(0.5 * safe) / safe
-    )
+    # sin(angle / 2) / angle, near 0 by its series
+    series = 0.5 - square / 48.0 + (square * square) / 3840.0
+    half = np.where(small, series, portable.sin(0.5 * safe) / safe)
     cosine = np.asarray(portable.cos(0.5 * angle))
     return rotations_from_unit_quaternions(
         np.concatenate([v * half[..., None], cosine[..., None]], axis=-1)
@@ -38,11 +38,10 @@ def rotation_vector(rotations: FloatArray) -> FloatArray:
     sine = np.sqrt((q[..., :3] * q[..., :3]).sum(axis=-1))
     angle = 2.0 * np.asarray(portable.arctan2(sine, q[..., 3]))
     small = angle < _SMALL
-    factor = np.where(
-        small,
-        2.0 + (angle * angle) / 12.0 + 7.0 * (angle * angle) * (angle * angle) / 2880.0,
-        angle / np.where(small, 1.0, sine),
-    )
+    # angle / sin(angle / 2), near 0 by its series
+    square = angle * angle
+    series = 2.0 + square / 12.0 + 7.0 * square * square / 2880.0
+    factor = np.where(small, series, angle / np.where(small, 1.0, sine))
     return np.asarray(q[..., :3] * factor[..., None])
 
 
@@ -95,6 +94,8 @@ class RotationSpline:
 
 def _velocities(h: FloatArray, turn: FloatArray) -> FloatArray:
     """Angular velocities (N, 3) at places h (N - 1,) apart, `turn` (N - 1, 3) rad between."""
+    # As of a cubic spline, the velocities that make the acceleration continuous solve a tridiagonal
+    # system, here of blocks; what turns depend on beyond that (`_curved`) is iterated.
     mean = turn / h[:, None]
     inner = len(h) - 1
     velocity = np.concatenate([mean, mean[-1:]])

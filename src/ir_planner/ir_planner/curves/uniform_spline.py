@@ -125,6 +125,8 @@ class UniformSpline:
         """q, qd, qdd (K - 2, n) at the knots; exactly at rest at both ends."""
         c = self.control
         h = self.interval
+        # A uniform cubic B-spline weighs the three control points around a knot by 1/6, 4/6, 1/6;
+        # its derivatives there are the central differences of them.
         q = (c[:-2] + 4.0 * c[1:-1] + c[2:]) / 6.0
         qd = (c[2:] - c[:-2]) / (2.0 * h)
         qdd = (c[:-2] - 2.0 * c[1:-1] + c[2:]) / (h * h)
@@ -143,20 +145,25 @@ class UniformSpline:
         q, qd, qdd = (values[:, None, :] for values in self.knots())
         t = (np.arange(per_interval) / per_interval * self.interval)[None, :, None]
         jerk = np.diff(qdd, axis=0) / self.interval
-        a = qdd[:-1] + t * jerk
-        v = qd[:-1]
-        s = q[:-1]
-        speed = v + t * (qdd[:-1] + 0.5 * t * jerk)
-        place = s + t * (v + t * (0.5 * qdd[:-1] + t * jerk / 6.0))
+
+        # q0 + v0 t + a0 t^2 / 2 + j t^3 / 6 and its derivatives, by Horner's rule
+        a0 = qdd[:-1]
+        v0 = qd[:-1]
+        place = q[:-1] + t * (v0 + t * (0.5 * a0 + t * jerk / 6.0))
+        speed = v0 + t * (a0 + 0.5 * t * jerk)
+        acceleration = a0 + t * jerk
+
         n = self.control.shape[1]
-        return place.reshape(-1, n), speed.reshape(-1, n), a.reshape(-1, n)
+        return place.reshape(-1, n), speed.reshape(-1, n), acceleration.reshape(-1, n)
 
     def extremes(self) -> Tops:
         """Largest values anywhere."""
+        # Acceleration is linear between knots and jerk constant, so both are largest at knots;
+        # speed is a parabola, which may turn inside an interval.
         _, qd, qdd = self.knots()
         jerk = np.diff(qdd, axis=0) / self.interval
         with np.errstate(divide="ignore", invalid="ignore"):
-            turn = -qdd[:-1] / jerk  # where the speed turns inside an interval
+            turn = -qdd[:-1] / jerk  # s after the knot: qdd + jerk t = 0
         turn = np.where((turn > 0.0) & (turn < self.interval), turn, 0.0)
         inside = qd[:-1] + turn * (qdd[:-1] + 0.5 * turn * jerk)
         speed = np.maximum(np.abs(qd).max(axis=0), np.abs(inside).max(axis=0))
@@ -164,6 +171,8 @@ class UniformSpline:
 
     def subdivided(self) -> "UniformSpline":
         """The same motion with a knot more in the middle of every interval."""
+        # Knot insertion by the Lane-Riesenfeld rule: the new control points are the middles of the
+        # old ones, and (1, 6, 1) / 8 of three neighbours.
         c = self.control
         finer = np.empty((2 * len(c) - 3, c.shape[1]))
         finer[0::2] = 0.5 * (c[:-1] + c[1:])
@@ -195,9 +204,12 @@ def _dying(
     lasts = min(longest, float(np.max(_GENTLY * np.abs(qd) / acceleration)))
     if lasts <= 0.0:
         return np.zeros((len(t), len(qd)))
+    # t (qd + t (qdd / 2 + 3 qd / T)) (1 - t / T)^3: speed qd and acceleration qdd at 0, where the
+    # term with 3 / T cancels what the third power adds, and at rest at T with its acceleration
     at = np.clip(t, 0.0, lasts)[:, None]
     left = 1.0 - at / lasts
-    return np.asarray(at * (qd + at * (0.5 * qdd + 3.0 * qd / lasts)) * (left * left * left))
+    start = qd + at * (0.5 * qdd + 3.0 * qd / lasts)
+    return np.asarray(at * start * (left * left * left))
 
 
 def along_motion(trajectory: JointTrajectory, count: int, duration: float) -> UniformSpline:
@@ -205,15 +217,13 @@ def along_motion(trajectory: JointTrajectory, count: int, duration: float) -> Un
     profile but for the duration [s].
     """
     begin = float(trajectory.times[0])
-    q = trajectory.sample(
-        begin + np.linspace(0.0, 1.0, count + 4) * (trajectory.duration - begin)
-    ).q
+    shares = np.linspace(0.0, 1.0, count + 4)
+    q = trajectory.sample(begin + shares * (trajectory.duration - begin)).q
     q[0] = trajectory.positions[0]
     q[-1] = trajectory.positions[-1]
+    # A control point lies outside its curve by a sixth of the second difference there.
     bend = np.zeros_like(q)
-    bend[1:-1] = (
-        q[:-2] - 2.0 * q[1:-1] + q[2:]
-    ) / 6.0  # a control point lies outside its curve by that
+    bend[1:-1] = (q[:-2] - 2.0 * q[1:-1] + q[2:]) / 6.0
     inner = (q - bend)[2:-2]
     control = np.concatenate([np.repeat(q[:1], 3, axis=0), inner, np.repeat(q[-1:], 3, axis=0)])
     return UniformSpline(control, duration / (count + 3))
@@ -224,7 +234,8 @@ def along_path(path: FloatArray, count: int, duration: float) -> UniformSpline:
     it.
     """
     share = np.arange(1, count + 1) / (count + 1)
-    inner = at_shares(path, share * share * (3.0 - 2.0 * share))
+    smooth = share * share * (3.0 - 2.0 * share)  # from 0 to 1 without speed at the ends
+    inner = at_shares(path, smooth)
     control = np.concatenate(
         [np.repeat(path[:1], 3, axis=0), inner, np.repeat(path[-1:], 3, axis=0)]
     )

@@ -30,6 +30,8 @@ def fewest_corners(
     free = np.full((count, count), False)
     free[first, last] = space.edges_free(points[first], points[last])
     free[np.arange(count - 1), np.arange(1, count)] = True  # steps of the path itself
+
+    # shortest path by dynamic programming: steps lead forward only
     steps = movement_cost(weights, points[:, None], points[None])
     steps = np.where(free, steps + _CORNER * steps[0, -1], np.inf)
     cost = np.zeros(count)
@@ -38,7 +40,8 @@ def fewest_corners(
         through = cost[:k] + steps[:k, k]
         came[k] = int(np.argmin(through))
         cost[k] = through[came[k]]
-    chosen = [count - 1]
+
+    chosen = [count - 1]  # back from the end
     while chosen[-1] != 0:
         chosen.append(int(came[chosen[-1]]))
     return points[chosen[::-1]]
@@ -94,20 +97,20 @@ def pulled(path: FloatArray, space: FreeSpace, weights: FloatArray) -> FloatArra
 def _best_pull(
     before: FloatArray, via: FloatArray, after: FloatArray, space: FreeSpace, weights: FloatArray
 ) -> FloatArray:
+    """The cheapest free place for a waypoint between its neighbours (n,): where it is, or a part of
+    the way to its projection on their straight line, into their range, or there with one joint.
+    """
     step = after - before
-    along = float(
-        np.clip(
-            portable.matmul(via - before, step) / max(float(portable.matmul(step, step)), 1e-12),
-            0.05,
-            0.95,
-        )
-    )
+    square = max(float(portable.matmul(step, step)), 1e-12)
+    along = float(np.clip(portable.matmul(via - before, step) / square, 0.05, 0.95))
     inside = np.clip(via, np.minimum(before, after), np.maximum(before, after))
     targets = [before + along * step, inside]
     for joint in range(len(via)):
         alone = via.copy()
         alone[joint] = inside[joint]
         targets.append(alone)
+
+    # only what costs less is certified
     trials = np.array([via + share * (target - via) for target in targets for share in _PULLS])
     cost = movement_cost(weights, before, trials) + movement_cost(weights, trials, after)
     now = float(movement_cost(weights, before, via) + movement_cost(weights, via, after))

@@ -65,6 +65,10 @@ def _knots(points: FloatArray, span: FloatArray) -> tuple[FloatArray, FloatArray
 
     q = np.concatenate([points[:1], points[:1], points[1:-1], points[-1:], points[-1:]])
     h = span[:, None]
+
+    # Continuous speed at knot k: h_{k-1} a_{k-1} + 2 (h_{k-1} + h_k) a_k + h_k a_{k+1} = 6 (s_k -
+    # s_{k-1}) with accelerations a and slopes s of the chords. At rest at both ends, the places of
+    # the virtual knots follow from their own acceleration: q_1 = q_0 + h^2 a_1 / 6.
     slope = np.diff(q, axis=0) / h
     slope[[0, -1]] = 0.0  # what is not known of the virtual knots stands in the matrix
     slope[1] = (q[2] - q[0]) / h[1]
@@ -79,6 +83,7 @@ def _knots(points: FloatArray, span: FloatArray) -> tuple[FloatArray, FloatArray
     upper[-1] = 0.0
     qdd = np.zeros_like(q)
     qdd[1:-1] = dgtsv(lower, diagonal, upper, 6.0 * np.diff(slope, axis=0))[3]
+
     q[1] += np.square(h[0]) * qdd[1] / 6.0
     q[-2] += np.square(h[-1]) * qdd[-2] / 6.0
     qd = np.zeros_like(q)

@@ -39,7 +39,11 @@ class LawLimits:
 def _ramp(
     speed: FloatArray, acceleration: FloatArray, jerk: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Durations (jerk phase, constant acceleration) (K,) s of a ramp from rest to `speed`."""
+    """Durations (jerk phase, constant acceleration) (K,) s of a ramp from rest to `speed`.
+
+    The two jerk phases alone gain a^2 / j. Below that the acceleration is not reached, and each
+    phase takes sqrt(v / j).
+    """
     full = speed * jerk >= acceleration * acceleration
     phase = np.where(full, acceleration / jerk, np.sqrt(speed / jerk))
     constant = np.where(full, speed / acceleration - acceleration / jerk, 0.0)
@@ -66,7 +70,11 @@ def reached_speed(limits: LawLimits) -> FloatArray:
 def _ramp_distance(
     speed: FloatArray, acceleration: FloatArray, jerk: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Distance (K,) of a ramp between rest and `speed`, and its derivative by the speed."""
+    """Distance (K,) of a ramp between rest and `speed`, and its derivative by the speed.
+
+    A ramp is symmetric, so its distance is v / 2 times its duration: v / a + a / j, or 2 sqrt(v /
+    j) where the acceleration is not reached.
+    """
     full = speed * jerk >= acceleration * acceleration
     root = np.sqrt(speed / jerk)
     distance = np.where(
@@ -81,6 +89,8 @@ def phase_steps(limits: LawLimits) -> IntArray:
     faster.
     """
     speed = reached_speed(limits)
+
+    # what both ramps don't cover of the distance 1 is left for constant speed
     up, steady = _ramp(speed, limits.acceleration, limits.jerk)
     down, slowing = _ramp(speed, limits.braking, limits.jerk)
     covered = 0.5 * speed * (2 * up + steady + 2 * down + slowing)
@@ -109,6 +119,10 @@ def law_states(steps: IntArray) -> LawStates:
     second back from 1.
     """
     t = steps * GRID_S
+
+    # Durations alone determine the law. Each ramp covers v / 2 times its duration, the cruise v
+    # times its own, and all is 1: that gives v. A ramp of phases t0, t1, t0 gains j t0 (t0 + t1) =
+    # v.
     rise = t[:, 0] * (t[:, 0] + t[:, 1])
     fall = t[:, 4] * (t[:, 4] + t[:, 5])
     speed = 1.0 / (0.5 * (2 * t[:, 0] + t[:, 1] + 2 * t[:, 4] + t[:, 5]) + t[:, 3])
@@ -117,6 +131,7 @@ def law_states(steps: IntArray) -> LawStates:
     jerk[:, 2] = -speed / rise
     jerk[:, 4] = -speed / fall
     jerk[:, 6] = speed / fall
+
     s, sd, sdd = np.zeros((3, len(steps), 8))
     peak = jerk[:, 0] * t[:, 0]
     brake = jerk[:, 4] * t[:, 4]
@@ -124,12 +139,14 @@ def law_states(steps: IntArray) -> LawStates:
     sdd[:, 2] = peak
     sdd[:, 5] = brake
     sdd[:, 6] = brake
+
     sd[:, 1] = 0.5 * peak * t[:, 0]
     sd[:, 2] = sd[:, 1] + peak * t[:, 1]
     sd[:, 3] = speed
     sd[:, 4] = speed
     sd[:, 6] = -0.5 * brake * t[:, 6]
     sd[:, 5] = sd[:, 6] - brake * t[:, 5]
+
     s[:, 7] = 1.0
     for k in (0, 1, 2):
         s[:, k + 1] = s[:, k] + t[:, k] * (
@@ -342,6 +359,9 @@ def level_laws(speed: FloatArray, up: FloatArray, down: FloatArray, jerk: float)
     levels_down = _at_ends(down)
     reached_up, length_up = _gains(rising, levels_up)
     reached_down, length_down = _gains(falling, levels_down)
+
+    # Braking has to lose what speeding up gained: its accelerations are scaled by that. The law
+    # that comes of it covers `distance` and is scaled to 1 at the end.
     scale = reached_up / reached_down
     left = np.maximum(1.0 - length_up - scale * length_down, 0.0)
     cruise = np.ceil(left / reached_up / GRID_S - 1e-9).astype(np.int64)
@@ -358,11 +378,16 @@ def _ramp_level_law(speed: FloatArray, levels: FloatArray, jerk: float) -> IntAr
     around = np.concatenate(
         [np.zeros((len(levels), 1)), levels, np.zeros((len(levels), 1))], axis=1
     )
+
+    # A change of level takes |a1 - a0| / j and gains the mean of both times that. It counts by
+    # halves in the bands of speed on either side; the first and the last belong to one band.
     change = np.abs(np.diff(around, axis=1)) / jerk
     gained = 0.5 * change * (around[:, :-1] + around[:, 1:])
     share = np.full(gained.shape, 0.5)
     share[:, 0] = 1.0
     share[:, -1] = 1.0
+
+    # each level is held for what its band still lacks
     bands = np.diff(np.concatenate([[0.0], BANDS])) * speed[:, None]
     by_change = gained[:, :-1] * share[:, :-1] + gained[:, 1:] * share[:, 1:]
     hold = np.maximum(bands - by_change, 0.0) / levels
