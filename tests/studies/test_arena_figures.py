@@ -154,8 +154,8 @@ def test_the_page_says_first_who_won_and_what_that_means() -> None:
     runs = [run(name, "1", 100.0, 0.1, 0.5) for name in settings.planners]
     page = page_html(runs, settings)
     answer = page.split('<section id="answer">')[1].partition("</section>")[0]
-    assert "<b>portfolio wins</b>" in answer
-    assert "it solved most, 1 of 1 runs" in answer
+    assert "<b>Nobody is shown to win</b>" in answer
+    assert "portfolio solved most, 1 of 1 runs" in answer
     assert "No difference is shown to sbl" in answer
     assert "in joules: energy of the drives + each robot's own price [W] x seconds" in page
     assert " J above" not in page
@@ -163,6 +163,19 @@ def test_the_page_says_first_who_won_and_what_that_means() -> None:
     assert "drives + 80 W x" in page_html(runs, replace(settings, time_value=80.0))
     runs[1] = run("sbl", "1", 90.0, 0.1, 0.5)
     assert "sbl may be named instead of the default, portfolio" in page_html(runs, settings)
+
+
+def test_a_winner_is_named_with_whom_it_is_shown_to_beat() -> None:
+    """Ten movements of which one planner solves none, and another one all at the same cost."""
+    planners = ("portfolio", "sbl", "rrt")
+    settings = ArenaSettings(cells=("open",), planners=planners)
+    cost = {"portfolio": 100.0, "sbl": 100.0, "rrt": math.nan}
+    runs = [run(name, str(k), cost[name], 0.1, 0.5) for name in planners for k in range(10)]
+    page = page_html(runs, settings)
+    assert "<b>portfolio wins against 1 of 2</b>" in page
+    assert "rrt<small>solves fewer</small>" in page
+    alone = [one for one in runs if one.entry.planner != "sbl"]
+    assert "<b>portfolio wins</b>" in page_html(alone, replace(settings, planners=planners[::2]))
 
 
 def test_free_questions_do_not_hide_where_the_portfolio_is_beaten() -> None:

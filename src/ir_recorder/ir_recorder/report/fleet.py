@@ -460,23 +460,19 @@ def _sure(price: Amount, costs: Costs) -> str:
     return f"90 % interval {between} {costs.currency}." if price.low < price.high else ""
 
 
-def _steps(paid: Paid, robots: Sequence[Robot], costs: Costs) -> str:
-    """What to do first, and then."""
+def _steps(paid: Paid, robots: Sequence[Robot], costs: Costs) -> list[str]:
+    """What to do, what saves most first."""
     found: list[tuple[float, str]] = []
     if paid.idle is not None:
         price = yearly_money(paid.idle.saved, costs.currency)
-        words = f"let them go into {paid.idle.mode} at night and at weekends ({price} a year)"
+        words = f"Let them go into {paid.idle.mode} at night and at weekends: {price} a year."
         found.append((paid.idle.saved, words))
     if paid.saved is not None and paid.saved.value > 0.0 and not paid.saved.doubt:
         best = max(robots, key=lambda robot: robot.saved.value if robot.saved is not None else 0.0)
         saved = costs.money(paid.saved.value)
         price = yearly_money(saved, costs.currency)
-        found.append((saved, f"drive the plans ({price} a year), most is saved at {best.name}"))
-    found.sort(reverse=True)
-    if not found:
-        return "Keep the programs as they are."
-    then = f" Then {found[1][1]}." if len(found) > 1 else ""
-    return f"First {found[0][1]}.{then}" if then else f"{found[0][1].capitalize()}."
+        found.append((saved, f"Drive the plans, that of {best.name} first: {price} a year."))
+    return [words for _, words in sorted(found, reverse=True)] or ["Keep the programs as they are."]
 
 
 def _badge(paid: Paid) -> str:
@@ -544,9 +540,12 @@ _ROBOT_HEADS = (
 def _robots(members: Sequence[Member], robots: Sequence[Robot], costs: Costs) -> str:
     """Those that cost most, each with what to change first; the others in one row."""
     rows = [_robot_row(robot, members, costs) for robot in robots[:_MOST_ROBOTS]]
-    others = [robot for robot in robots[_MOST_ROBOTS:] if not robot.drives_only]
+    rest = robots[_MOST_ROBOTS:]
+    others = [robot for robot in rest if not robot.drives_only]
     if others:
-        name = f"{counted(len(others), 'other robot')}<small>listed below</small>"
+        without = len(rest) - len(others)
+        name = counted(len(rest), "other robot")
+        name += f"<small>{without} of them in no sum</small>" if without else ""
         rows.append((name, *_sums(others, members, costs), DASH, DASH))
     summed = [robot for robot in robots if not robot.drives_only]
     if len(summed) > 1:
@@ -575,7 +574,9 @@ def _robot_row(robot: Robot, members: Sequence[Member], costs: Costs) -> tuple[s
     own = _own(members, robot)
     idle = None if robot.drives_only else _idle_saving(own, costs)
     part = robot.joules / costs.parts_per_cycle
-    made = f"{', '.join(robot.origins)}, {counted(robot.recordings, 'recording')}"
+    made = ", ".join(robot.origins)
+    if robot.recordings > 1:
+        made += f", {counted(robot.recordings, 'recording')}"
     return (
         f"{text(robot.name)}<small>{text(robot.cell)}</small><small>{text(made)}</small>"
         + (f"<small>{DRIVES_ONLY}</small>" if robot.drives_only else ""),
@@ -614,11 +615,17 @@ def _sums(robots: Sequence[Robot], members: Sequence[Member], costs: Costs) -> t
     )
 
 
+_NAMED = 5  # robots in a sentence
+
+
 def _apart(robots: Sequence[Robot]) -> str:
     """Which robots are in no sum, and why; "" where all are."""
-    names = ", ".join(robot.name for robot in robots if robot.drives_only)
-    if not names:
+    apart = [robot.name for robot in robots if robot.drives_only]
+    if not apart:
         return ""
+    names = ", ".join(apart[:_NAMED])
+    if len(apart) > _NAMED:
+        names += f" and {len(apart) - _NAMED} more"
     return text(
         f"In no sum, as their energy at the mains isn't known ({DRIVES_ONLY}), nor what they take "
         f"at rest: {names}."
@@ -690,29 +697,25 @@ def _months(members: Sequence[Member]) -> str:
         own = [m for m in known if (m.month, m.cycle.origin) == (month, origin)]
         driven, predicted = (sum(getattr(m, name) for m in own) for name in ("driven", "predicted"))
         shares = [m.driven / m.predicted - 1.0 for m in own]
+        made = f"{origin}, {counted(len({m.robot for m in own}), 'robot')}"
+        if len(own) > 1:
+            made += f", {counted(len(own), 'recording')}"
+        ends = f"<small>{percent(min(shares))} to {percent(max(shares))}</small>"
         rows.append(
             (
-                text(month),
-                text(origin),
-                str(len({m.robot for m in own})),
-                str(len(own)),
+                f"{text(month)}<small>{text(made)}</small>",
                 f"<b>{kilowatt_hours(driven)}</b>",
                 kilowatt_hours(predicted),
-                f"<b>{percent(driven / predicted - 1.0)}</b>"
-                + (
-                    f"<small>{percent(min(shares))} to {percent(max(shares))}</small>"
-                    if len(own) > 1
-                    else ""
-                ),
+                f"<b>{percent(driven / predicted - 1.0)}</b>{ends if len(own) > 1 else ''}",
             )
         )
-    heads = ("month", "origin", ">robots", ">recordings", ">driven", ">predicted", ">difference")
+    heads = ("month", ">driven", ">predicted", ">difference")
     hint = (
-        "Runs as they were driven, waiting between steps included, which no plan contains; below a "
-        "difference those of single recordings. A difference that grows is a robot, a tool or a "
-        "program that has changed."
+        "Runs as they were driven, waiting between steps included, which no plan contains; small: "
+        "of single recordings. A difference that grows is a robot, a tool or a program that has "
+        "changed."
     )
-    return f'<p class="hint">{hint}</p>{table(heads, rows, "Month by month")}'
+    return f'{table(heads, rows, "Month by month", COMPACT)}<p class="hint">{hint}</p>'
 
 
 def _clock_row(

@@ -215,7 +215,7 @@ def _ranking_table(ranking: _Ranking) -> str:
     mine = ranking.found[ranking.winner]
     rows = [
         (
-            f"<b>{text(mine.planner)}</b><small>wins</small>",
+            f"<b>{text(mine.planner)}</b><small>first</small>",
             f"<b>{mine.solved}</b> of {mine.count}",
             bar(mine.success, 1.0, "planned"),
             DASH,
@@ -272,16 +272,26 @@ def _answer(ranking: _Ranking | None, runs: Sequence[ArenaRun], settings: ArenaS
     best = ranking.found[ranking.winner]
     words = (
         f"Of {counted(len(settings.planners), 'planner')} with {settings.seconds:g} s of processor "
-        f"for each of {counted(ranking.questions, 'movement')} it solved most, {best.solved} of "
-        f"{best.count} runs, and of those that solved as many its trajectories cost least, "
-        f"{100.0 * (best.cost_ratio - 1.0):.2f} % above the best known in the median."
+        f"for each of {counted(ranking.questions, 'movement')} {best.planner} solved most, "
+        f"{best.solved} of {best.count} runs, and of those that solved as many its trajectories "
+        f"cost least, {100.0 * (best.cost_ratio - 1.0):.2f} % above the best known in the median."
     )
     return Answer(
-        f"{best.planner} wins",
+        _result(ranking),
         words,
         _sure(ranking, runs, settings),
         _to_do(ranking, runs, settings),
     )
+
+
+def _result(ranking: _Ranking) -> str:
+    """Whom the first one is shown to beat."""
+    worse = sum(_differs(other) != "" for other in ranking.others)
+    if not ranking.others or worse == len(ranking.others):
+        return f"{ranking.winner} wins"
+    if worse:
+        return f"{ranking.winner} wins against {worse} of {len(ranking.others)}"
+    return "Nobody is shown to win"
 
 
 def _sure(ranking: _Ranking, runs: Sequence[ArenaRun], settings: ArenaSettings) -> str:
@@ -366,7 +376,7 @@ def _verdict(ranking: _Ranking | None, settings: ArenaSettings) -> tuple[str, bo
     if ranking is None or not _judged(settings):
         return "", False
     if ranking.winner == PORTFOLIO:
-        return "The default wins", True
+        return "Nobody is ahead of the default", True
     return f"{ranking.winner} is ahead of the default", False
 
 

@@ -287,7 +287,7 @@ def _answer(
         do = f"Leave everything where it stands: less than one hour of an engineer ({hour})."
         return Answer(result, words, sure, do)
     do = (
-        f"{payback(year.money, costs).capitalize()}. Plan best_1.yaml, and look at cables, ways of "
+        f"Move: that {payback(year.money, costs)}. Plan best_1.yaml, and look at cables, ways of "
         "people and how parts come, which no study knows."
     )
     return Answer(result, words, sure, do)

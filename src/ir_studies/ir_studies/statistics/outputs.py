@@ -306,7 +306,7 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
         "comparisons": _table(
             found.comparisons, "Asynchronous against synchronous", (">asynchronous", ">synchronous")
         ),
-        "left_out": folded(_left_out(found), paper=True),
+        "left_out": folded(_left_out(found)),
         "comparison_dots": dots(
             found.comparisons, "asynchronous less synchronous, in percent of synchronous"
         ),
