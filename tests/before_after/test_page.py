@@ -18,6 +18,7 @@ from ir_msgs_py.savings import BeforeAfter
 from ir_planner import Planner
 from ir_recorder.analysis.production import home_watts
 from ir_recorder.report.costs import J_PER_KWH, Costs, money
+from ir_recorder.report.motion_scene import common_rests, in_step
 from ir_recorder.report.number_text import (
     kilograms,
     kilowatt_hours,
@@ -270,3 +271,21 @@ def test_what_makes_no_sense_is_a_sentence(
 ) -> None:
     assert main(["compare", *arguments]) == code
     assert words in capsys.readouterr().err
+
+
+def test_curves_of_both_programs_are_in_step_at_every_stop(compared: BeforeAfter) -> None:
+    """Once they drifted apart, and a pause of 180 s was cut to what both had of it together."""
+    sides = [compared.today, *compared.sides]
+    drawn = in_step(sides)
+    ends = []
+    for each, side in zip(drawn, sides, strict=True):
+        starts = np.cumsum([0.0, *(hop.seconds for hop in side.hops)])[:-1]
+        alike = min(len(starts), len(drawn[0].there))  # one may wait at its end
+        assert each.at(starts)[:alike] == pytest.approx(drawn[0].there[:alike])
+        times = np.linspace(0.0, side.report.duration, 500)
+        assert (np.diff(each.at(times)) >= 0.0).all()
+        ends.append(each.end)
+    assert max(ends) >= max(side.report.duration for side in sides)
+    longest = max(hop.seconds for hop in compared.today.hops if hop.is_pause)
+    rests = common_rests(sides)
+    assert max((end - start for start, end in rests), default=longest) == pytest.approx(longest)

@@ -291,8 +291,8 @@ def costs_section(analysis: Analysis, costs: Costs) -> str:
     cycle = production_of(analysis)
     if cycle is None:
         return ""
-    rows = [_row(cycle, costs), *_saved(cycle, costs)]
-    heads = ("", ">a cycle", ">a part", ">a shift", ">a year")
+    rows = [*_before(cycle, costs), _row(cycle, costs), *_saved(cycle, costs)]
+    heads = ("", ">a cycle", ">1 000 parts", ">a shift", ">a year")
     origin = (
         f"Energy of the run is {analysis.recording.origin}"
         if analysis.program is not None
@@ -301,21 +301,24 @@ def costs_section(analysis: Analysis, costs: Costs) -> str:
     notes = "".join(f" {note[0].upper()}{note[1:]}." for note in cycle.notes)
     return (
         '<section id="costs"><h2>What a cycle costs</h2>'
-        f'<p class="hint">{text(origin)}; savings are predicted, with their '
-        f"90 % interval, of as many cycles as the common program makes.{text(notes)} "
-        f"{counted_with(costs)}</p>"
+        f'<p class="hint">{text(origin)}{_saving_is(cycle)}. A year has '
+        f"{cycles_of_year(cycle.pace, costs)}.{text(notes)} {counted_with(costs)}</p>"
         f"{table(heads, rows, 'What a cycle costs')}</section>"
     )
 
 
+def _saving_is(cycle: Production) -> str:
+    if cycle.savings is None:
+        return ""
+    return "; the common program and savings are predicted, with their 90 % interval"
+
+
 def _counts(pace: float, costs: Costs) -> tuple[float, float, float]:
-    """Cycles of a part, a shift and a year, with so many seconds [s] from one to the next."""
-    a_part = 1.0 / costs.parts_per_cycle
-    return a_part, costs.cycles_per_shift(pace), costs.cycles_per_year(pace)
-
-
-def _yearly_cycles(pace: float, costs: Costs) -> str:
-    return f"<small>{cycles_of_year(pace, costs)}</small>"
+    """Cycles of a thousand parts, a shift and a year, with so many seconds [s] from one to the
+    next.
+    """
+    thousand = 1000.0 / costs.parts_per_cycle
+    return thousand, costs.cycles_per_shift(pace), costs.cycles_per_year(pace)
 
 
 def cycles_of_year(pace: float, costs: Costs) -> str:
@@ -329,13 +332,26 @@ def idle_money(energy: float, costs: Costs) -> str:
     return money(energy / J_PER_KWH * costs.idle_price, costs.currency)
 
 
+def _before(cycle: Production, costs: Costs) -> list[tuple[str, ...]]:
+    """The common program, where the cycle is held against it."""
+    if cycle.savings is None:
+        return []
+    total = cycle.savings.total
+    pace = total.seconds or cycle.seconds
+    return [_cycle_row("common program, predicted", pace, total.common, pace, costs)]
+
+
 def _row(cycle: Production, costs: Costs) -> tuple[str, ...]:
-    counts = _counts(cycle.pace, costs)
-    shown = f"<b>{kilowatt_hours(cycle.energy)}</b><small>{seconds(cycle.seconds)}</small>"
-    year = cycle.energy * counts[-1]
-    priced = [_priced(cycle.energy * count, year, costs) for count in counts]
-    priced[-1] += _yearly_cycles(cycle.pace, costs)
-    return (text(cycle.name), shown, *priced)
+    return _cycle_row(cycle.name, cycle.seconds, cycle.energy, cycle.pace, costs)
+
+
+def _cycle_row(
+    name: str, length: float, energy: float, pace: float, costs: Costs
+) -> tuple[str, ...]:
+    counts = _counts(pace, costs)
+    shown = f"<b>{kilowatt_hours(energy)}</b><small>{seconds(length)}</small>"
+    year = energy * counts[-1]
+    return (text(name), shown, *(_priced(energy * count, year, costs) for count in counts))
 
 
 def _priced(energy: float, year: float, costs: Costs) -> str:
@@ -451,7 +467,6 @@ def _saving(where: str, saving: Saving, pace: float, costs: Costs) -> tuple[str,
         if abs(year) >= _NOTHING and price.high > price.low:
             between = f"<small>{text(_span_of_money(price.low, price.high, _UNSEEN))}</small>"
         cells.append(f"<b>{text(shown)}</b>{between}")
-    cells[-1] += _yearly_cycles(pace, costs)
     return (f"{word} {where}", *cells)
 
 

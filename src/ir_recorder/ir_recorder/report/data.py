@@ -37,11 +37,11 @@ from ir_values.arrays import FloatArray
 
 MOST_POINTS = 24_000  # of the power curve: 4 minutes as they were read
 _BITS = {
-    "ab": "AB",
-    "hib": "HIB",
-    "bbs": "BBS",
-    "drives_ready": "drives",
-    "emergency_stop": "e-stop",
+    "ab": "bus off",
+    "hib": "sleep",
+    "bbs": "ready",
+    "drives_ready": "drives on",
+    "emergency_stop": "stop",
 }
 MOST_CLEARANCES = 6_000  # per movement: 2 minutes at the 50 Hz of the profile
 
@@ -137,14 +137,14 @@ def _lanes(analysis: Analysis) -> Iterator[dict[str, Json]]:
         yield {"label": "load", "spans": list(_load_spans(analysis))}
     yield from machine_lanes(recording)
     for series, side, names in (
-        (recording.plc_inputs, "in", ("ab", "hib", "emergency_stop")),
-        (recording.plc_outputs, "out", ("bbs", "ab", "drives_ready")),
+        (recording.plc_inputs, " ?", ("ab", "hib", "emergency_stop")),
+        (recording.plc_outputs, "", ("bbs", "ab", "drives_ready")),
     ):
         if series is not None and len(series.time):
             for name in names:
                 spans = list(_bit_spans(series, name, recording.duration))
                 if spans:
-                    yield {"label": f"{_BITS[name]} {side}", "spans": spans, "thin": True}
+                    yield {"label": f"{_BITS[name]}{side}", "spans": spans, "thin": True}
 
 
 def _step_span(step: ExecutedStep) -> list[Json]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -158,14 +159,55 @@ def rests_of(side: Side) -> list[Span]:
     return [*rests, (side.report.duration, math.inf)]
 
 
-def power_curves(sides: Sequence[Side]) -> dict[str, Json]:
-    """Power at the mains of all programs on one grid, each from its start, every peak kept; a few
-    points in rests that all have.
+_ROUNDING = 1e-6  # s: begins of steps are sums
+
+
+@dataclass(frozen=True, eq=False)
+class InStep:
+    """Programs beside each other, stop by stop: what one is sooner it waits for the others.
+
+    begins (K,) [s]: of its movements and pauses in their own time; there (K,): where they are
+    drawn.
     """
-    end = max(side.report.duration for side in sides)
+
+    begins: FloatArray
+    there: FloatArray
+    end: float
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Where times (N,) [s] of the program are drawn; increasing."""
+        own = np.clip(np.searchsorted(self.begins - _ROUNDING, time, "right") - 1, 0, None)
+        drawn: FloatArray = self.there[own] + time - self.begins[own]
+        return drawn
+
+
+def in_step(sides: Sequence[Side]) -> list[InStep]:
+    """Programs stop by stop, each from its own start where their stops are not the same."""
+    names = [[hop.name for hop in side.hops] for side in sides]
+    lengths = [np.array([hop.seconds for hop in side.hops]) for side in sides]
+    alike = min(map(len, names))
+    if any(own[:alike] != names[0][:alike] for own in names):
+        alike = 0
+    longest = np.max([own[:alike] for own in lengths], axis=0)
+    found = []
+    for own in lengths:
+        drawn = np.concatenate([longest, own[alike:]])
+        begins, there = (np.concatenate([[0.0], np.cumsum(each)]) for each in (own, drawn))
+        # the last of a program ends when it does
+        end = float(there[-2] + own[-1]) if len(own) else 0.0
+        found.append(InStep(begins[:-1], there[:-1], end))
+    return found
+
+
+def power_curves(sides: Sequence[Side]) -> dict[str, Json]:
+    """Power at the mains of all programs on one grid, stop by stop, every peak kept; a few points
+    in rests that all have.
+    """
+    drawn = in_step(sides)
+    end = max(each.end for each in drawn)
     time = np.linspace(0.0, end, 8 * _POINTS)
     inner = 0.5  # s at the ends of a rest, in which modes change
-    rests = long_rests([rests_of(side) for side in sides])
+    rests = common_rests(sides)
     resting = np.zeros(len(time), dtype=bool)
     for start, stop in rests:
         resting |= (time > start + inner) & (time < stop - inner)
@@ -173,13 +215,25 @@ def power_curves(sides: Sequence[Side]) -> dict[str, Json]:
     kept = moving[:: max(1, len(moving) // _POINTS)]
     time = time[np.union1d(kept, np.flatnonzero(resting)[::64])]
     middle = (time[1:] + time[:-1]) / 2.0
-    over = [middle > side.report.duration for side in sides]
-    lows = [stretches(time, side.time, side.watts).low for side in sides]
-    highs = [stretches(time, side.time, side.high).high for side in sides]
+    over = [middle > each.end for each in drawn]
+    both = list(zip(drawn, sides, strict=True))
+    lows = [stretches(time, each.at(side.time), side.watts).low for each, side in both]
+    highs = [stretches(time, each.at(side.time), side.high).high for each, side in both]
     low, high = (np.where(np.transpose(over), 0.0, np.transpose(own)) for own in (lows, highs))
     curves = packed(Curves("power at the mains, predicted", "W", middle, high, low=low))
-    ends: list[Json] = [side.report.duration for side in sides]
+    ends: list[Json] = [each.end for each in drawn]
     return {**curves, "names": [side.name for side in sides], "ends": ends}
+
+
+def common_rests(sides: Sequence[Side]) -> list[Span]:
+    """Long rests [s] of all programs, stop by stop."""
+    rests = []
+    for each, side in zip(in_step(sides), sides, strict=True):
+        own = np.array(rests_of(side)[:-1]).reshape(-1, 2)
+        begins = each.at(own[:, 0])
+        ends = begins + own[:, 1] - own[:, 0]
+        rests.append([*zip(begins.tolist(), ends.tolist(), strict=True), (each.end, math.inf)])
+    return long_rests(rests)
 
 
 def _timed(side: Side) -> list[tuple[float, PlannedMovement]]:

@@ -39,7 +39,7 @@ from ir_recorder.report.costs import (
     yearly_span,
 )
 from ir_recorder.report.files import write_output
-from ir_recorder.report.motion_scene import motion_of, power_curves, rests_of
+from ir_recorder.report.motion_scene import common_rests, in_step, motion_of, power_curves, rests_of
 from ir_recorder.report.number_text import (
     DASH,
     ENGLISH,
@@ -473,6 +473,7 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
         "sides": [motion_of(side, cell) for side in there],
         "planned": found.towards,
         "axes": [power_curves(there)],
+        "curves": {"end": max(each.end for each in in_step(there)), "rests": common_rests(there)},
         "rests": long_rests([rests_of(side) for side in there]),
     }
     parts = {

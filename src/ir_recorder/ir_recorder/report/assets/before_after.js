@@ -4,7 +4,8 @@
   const find = (id) => document.getElementById(id);
   const data = JSON.parse(find("data").textContent), timeline = new Timeline(data.end, data.rests);
   const sides = Object.fromEntries(data.sides.map((side) => [side.name, { ...data.cell, ...side }]));
-  const charts = axesSection(find("axes"), timeline, find("tip"), data.axes);
+  const together = new Timeline(data.curves.end, data.curves.rests); /* stop by stop */
+  const charts = axesSection(find("axes"), together, find("tip"), data.axes);
   const today = new Motion(find("view-today"), timeline, sides.today, 0);
   const planned = new Motion(find("view-planned"), timeline, sides[data.planned], 0);
   const views = [today, planned];
@@ -39,5 +40,7 @@
   themes(() => { for (const chart of charts) chart.schedule(); for (const view of views) view.recolour(); },
     () => { for (const chart of charts) chart.paint(); for (const view of views) { view.recolour(); view.draw(); } });
   exportButtons();
+  foldOnPhones(["year", "changes"]);
   timeline.seek(0);
+  together.seek(0);
 })();

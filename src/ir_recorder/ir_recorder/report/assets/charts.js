@@ -116,6 +116,9 @@ function laneKey(place, lanes) {
     item.append(key, words);
     place.append(item);
   }
+  if (lanes.some((lane) => lane.label.endsWith(" ?"))) {
+    place.append(Object.assign(document.createElement("span"), { textContent: "PLC: with ? what it asks of the controller (drive bus off; sleep: hibernation), without what the controller answers" }));
+  }
 }
 
 class TimeChart {

@@ -92,7 +92,7 @@ addEventListener("afterprint", () => { for (const part of unfolded) part.open = 
 function typeset() {
   const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   while (walk.nextNode()) {
-    const node = walk.currentNode, words = node.data.replace(/(^|[\s(])-(?=\d)/g, "$1\u2212").replace(/(\d) (?=\d{3}(?!\d)|%|(?:[kM]?Wh|k?[JW]|min|h|s|mm|m|kg|EUR|deg)(?!\w))/g, "$1\u00a0");
+    const node = walk.currentNode, words = node.data.replace(/(^|\s|\u0028)-(?=\d)/g, "$1\u2212").replace(/(\d) (?=\d{3}(?!\d)|%|(?:[kM]?Wh|k?[JW]|min|h|s|mm|m|kg|EUR|deg)(?!\w))/g, "$1\u00a0");
     if (words !== node.data && !node.parentElement.closest("script, style, code, pre")) node.data = words;
   }
 }
@@ -124,5 +124,20 @@ function exportButtons() {
     const name = bars.dataset.name;
     const save = () => download(fileName(name, "svg"), "image/svg+xml", new XMLSerializer().serializeToString(barsToSvg(bars)));
     bars.after(button("SVG", name, save));
+  }
+}
+
+/* On a telephone: what comes after the answer opens when its heading is chosen; curves and pictures stay. */
+function foldOnPhones(kept) {
+  if (!matchMedia("(max-width: 700px)").matches) return;
+  for (const section of document.querySelectorAll("main > section[id]")) {
+    const head = section.querySelector(":scope > h2");
+    if (!head || kept.includes(section.id) || section.querySelector("canvas")) continue;
+    const part = document.createElement("details"), summary = document.createElement("summary");
+    part.className = "part";
+    part.id = section.id;
+    summary.append(head);
+    part.append(summary, ...section.childNodes);
+    section.replaceWith(part);
   }
 }
