@@ -36,10 +36,10 @@ class Drawn:
 
 FEW = (
     Drawn("demo", -1),
-    Drawn("table_columns", 0),
     Drawn("cnc_door", 1),
 )
 MORE = (
+    Drawn("table_columns", 0),
     Drawn("demo", 0),
     Drawn("open", 0),
     Drawn("open", 1),

@@ -94,6 +94,7 @@ def test_a_limit_of_the_peak_holds_at_every_shift_and_where_robots_wake_up(
     assert common_peak(runs) <= limited().peak_power * (1.0 + SHARE)
 
 
+@pytest.mark.long
 def test_two_robots_need_what_was_planned_and_keep_apart_by_their_order() -> None:
     """They meet where the signals that keep the order are taken away: the judge sees it."""
     runs = driven(programs())

@@ -17,6 +17,7 @@ from ir_studies.errors import SettingsError
 AGREED = 1e-4  # of the energy: hops of a millisecond
 
 
+@pytest.mark.long
 def test_another_model_finds_the_same_energy(tmp_path: Path) -> None:
     cell = load_cell("flexible")
     assert cell.route is not None
