@@ -249,8 +249,15 @@ PASSED = """
 import json, sys
 seen = set()
 def look(frame, event, argument):
-    if event == "call":
-        seen.add(frame.f_code.co_filename)
+    file = frame.f_code.co_filename
+    if event == "call" and file not in seen and not importing(frame):
+        seen.add(file)
+def importing(frame):
+    while frame is not None and frame.f_back is not None:
+        if frame.f_code.co_name == "<module>":
+            return True
+        frame = frame.f_back
+    return False
 sys.setprofile(look)
 import threading
 threading.setprofile(look)
