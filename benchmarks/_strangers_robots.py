@@ -17,8 +17,8 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from ir_cli.robot_from_urdf import RobotSource, made_robot
-from ir_description import Capsule
 from ir_description.files.solid_mesh import read_solid
+from ir_description.shapes import Capsule
 from ir_kernels import Chain
 
 sys.path.append(str(Path(__file__).parents[1] / "tools"))

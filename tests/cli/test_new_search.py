@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from ir_cli.main import main
+from ir_msgs_py.ros.testing import PATIENCE, WaitFor, own_domain
 
 NAME = "over_the_top"
 SETTINGS = f"""\
@@ -34,15 +38,37 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "site"
 
 
-def run(site: Path, *words: str) -> subprocess.CompletedProcess[str]:
+def environment(site: Path) -> dict[str, str]:
+    """Of a process that finds the package and only nodes of this host."""
     path = os.pathsep.join([str(site), os.environ.get("PYTHONPATH", "")])
+    found = {**os.environ, "PYTHONPATH": path, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    return {**found, "ROS_DOMAIN_ID": str(own_domain())}
+
+
+def run(site: Path, *words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, *words],
-        env={**os.environ, "PYTHONPATH": path},
+        env=environment(site),
         capture_output=True,
         text=True,
         cwd=site,
     )
+
+
+@contextlib.contextmanager
+def running(site: Path, *words: str) -> Iterator[None]:
+    """A process that is there meanwhile."""
+    process = subprocess.Popen(
+        [sys.executable, *words], env=environment(site), cwd=site, start_new_session=True
+    )
+    try:
+        yield
+    finally:
+        process.send_signal(signal.SIGINT)
+        try:
+            process.wait(PATIENCE)
+        finally:
+            process.kill()
 
 
 def test_it_plans_by_its_name_and_says_whose_it_is(site: Path) -> None:
@@ -75,6 +101,52 @@ def test_it_reaches_workers_of_the_arena(site: Path, tmp_path: Path) -> None:
     assert answer.returncode == 0, answer.stderr
     rows = (tmp_path / "out" / "results.jsonl").read_text()
     assert "ir-search-over-the-top 0.1.0 (searches: over_the_top)" in rows
+
+
+@pytest.mark.long
+def test_it_reaches_workers_of_a_dask_cluster(
+    site: Path, tmp_path: Path, wait_for: WaitFor
+) -> None:
+    pytest.importorskip("distributed")
+    (tmp_path / "arena.yaml").write_text(SETTINGS)
+    said = tmp_path / "scheduler.json"
+    here = ("--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", str(said))
+    dask = ("-m", "distributed.cli.dask_scheduler", *here, "--port", "0")
+    with running(site, *dask):
+        wait_for(said.is_file, what="the scheduler listens")
+        address = wait_for(lambda: address_in(said), what="the scheduler says where")
+        alone = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1")
+        with running(site, "-m", "distributed.cli.dask_worker", address, *alone):
+            arena = ("-m", "ir_cli.main", "study", "arena", str(tmp_path / "arena.yaml"))
+            answer = run(site, *arena, "--scheduler", address, "-o", str(tmp_path / "out"))
+    assert answer.returncode == 0, answer.stderr
+    rows = (tmp_path / "out" / "results.jsonl").read_text()
+    assert "ir-search-over-the-top 0.1.0 (searches: over_the_top)" in rows
+
+
+def address_in(file: Path) -> str:
+    """What a scheduler wrote, "" while it has not."""
+    try:
+        return str(json.loads(file.read_text())["address"])
+    except ValueError:
+        return ""
+
+
+@pytest.mark.long
+def test_a_running_planner_node_plans_with_it_by_name(site: Path) -> None:
+    planner = "from ir_planner.node import main; main()"
+    request = (
+        "{start: {position: [0.0, -1.5708, 1.5708, 0.0, 0.0, 0.0]}, "
+        "goal: 'A1 30 A2 -100 A3 100 A4 0 A5 20 A6 0', options: {planner_id: NAME}}"
+    )
+    call = ("-m", "ir_cli.main", "ros", "call", "/ir_planner/plan_regional_movement")
+    with running(site, "-c", planner, "--ros-args", "-p", "cell:=demo"):
+        answer = run(site, *call, request.replace("NAME", NAME), "--timeout", str(PATIENCE))
+        assert answer.returncode == 0, answer.stdout + answer.stderr
+        assert f"planner_id: {NAME}" in answer.stdout
+        wrong = run(site, *call, request.replace("NAME", "none"), "--timeout", str(PATIENCE))
+    assert wrong.returncode == 1
+    assert NAME in wrong.stdout + wrong.stderr
 
 
 def test_the_node_has_its_settings_as_parameters(site: Path) -> None:
