@@ -7,20 +7,17 @@ from ir_planner.cartesian.plan import (
     CartesianPlan,
     checked_path_options,
     choices_along,
-    heading_status,
     plan_path,
 )
-from ir_planner.cartesian.tool_path import HeadingError, PathRefusedError
+from ir_planner.cartesian.tool_path import PathRefusedError
 
 __all__ = [
     "Arc",
     "CartesianPlan",
-    "HeadingError",
     "Line",
     "PathRefusedError",
     "arc_through",
     "checked_path_options",
     "choices_along",
-    "heading_status",
     "plan_path",
 ]

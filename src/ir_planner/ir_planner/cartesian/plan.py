@@ -26,7 +26,6 @@ from ir_planner.cartesian.path_parts import TURN_LENGTH, TURN_SPEED, parts_of
 from ir_planner.cartesian.tool_error import PathAccuracy, kept_of
 from ir_planner.cartesian.tool_path import (
     REVERSAL,
-    HeadingError,
     Joint,
     PathRefusedError,
     ToolPath,
@@ -203,7 +202,7 @@ def choices_along(
     path: CartesianPath, context: Context, after: FreeSpace, most: int
 ) -> list[ChosenMovement]:
     """Certified movements whose ends keep the safety distance from everything, at their end also in
-    the space `after`; at most `most`. Raises PathRefusedError, HeadingError, RequestError.
+    the space `after`; at most `most`. Raises PathRefusedError, RequestError.
     """
     whole = drawn(path, None, False, context)
     whole = replace(whole, layers=replace(whole.layers, free=_ends_free(whole, after)))
@@ -351,8 +350,6 @@ def plan_path(
         return _planned(path, start, t1, context)
     except PathRefusedError as error:
         return _answer(error.status, context)
-    except HeadingError as error:
-        return _answer(heading_status(error), context)
 
 
 def _planned(
@@ -380,11 +377,6 @@ def _planned(
         whole.lengths,
         len(whole.layers.q),
     )
-
-
-def heading_status(error: HeadingError) -> Status:
-    """The answer where the tool can't turn with the path."""
-    return Status(StatusCode.INVALID_MOTION_PLAN, f"orientation is {TANGENT}: {error}")
 
 
 def _answer(status: Status, context: Context) -> CartesianPlan:

@@ -264,7 +264,9 @@ class ToolPath:
 
     @cached_property
     def _heading(self) -> BSpline:
-        """Angle of the path about the tool's axis over u, 0 at the start. Raises HeadingError."""
+        """Angle of the path about the tool's axis over u, 0 at the start. PathRefusedError where it
+        runs along that axis.
+        """
         ends = self._clipped(np.array([-np.inf, np.inf]))
         inner = self.corners + np.linspace(-1.0, 1.0, 33)[:, None] * self.radius
         even = np.linspace(ends[0], ends[1], 40 * len(self.parts) + 200)
@@ -278,19 +280,13 @@ class ToolPath:
         across = portable.hypot(local[:, 1], local[:, 2])
         if across.min() < portable.sin(_ALONG_AXIS):
             place = float(u[int(np.argmin(across))])
-            raise HeadingError(
-                place if self._arc is None else float(self._arc.of(np.array([place]))[0])
+            along = place if self._arc is None else float(self._arc.of(np.array([place]))[0])
+            raise PathRefusedError(
+                f"orientation is {TANGENT}: the path runs along the tool's axis at {along:.3f} m",
+                StatusCode.INVALID_MOTION_PLAN,
             )
         angle = np.unwrap(portable.arctan2(local[:, 2], local[:, 1]))
         return portable.interpolating_spline(u, angle - angle[0], 3)
-
-
-class HeadingError(Exception):
-    """The path runs along the tool's axis at `place` m, where it gives no heading."""
-
-    def __init__(self, place: float) -> None:
-        super().__init__(f"the path runs along the tool's axis at {place:.3f} m")
-        self.place = place
 
 
 # How parts of a path are joined at the corner between them, and by how much that leaves the

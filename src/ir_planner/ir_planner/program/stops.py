@@ -9,7 +9,7 @@ import numpy as np
 from ir_description import Station
 from ir_kernels import portable
 from ir_msgs_py.status import Status, StatusCode
-from ir_planner.cartesian import HeadingError, PathRefusedError, choices_along, heading_status
+from ir_planner.cartesian import PathRefusedError, choices_along
 from ir_planner.checks import FreeSpace, too_near
 from ir_planner.configurations import (
     INTERACTION,
@@ -304,8 +304,6 @@ def path_nodes(arriving: Context, leaving: PlanningScene) -> tuple[list[StopNode
         paths = choices_along(path, arriving, after, _MOST_PATH_STOPS)
     except PathRefusedError as error:
         return [], _along(name, error.status)
-    except HeadingError as error:
-        return [], _along(name, heading_status(error))
     except RequestError as error:  # a path that draws nothing
         raise RequestError(error.code, f"path {name}: {error}") from error
     return [
