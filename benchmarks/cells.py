@@ -43,7 +43,7 @@ from _steady_judge import least_by_orders
 
 from ir_description import RobotCells, load_robot_cells
 from ir_planner import Planner, ProgramPlan, RequestError
-from ir_planner.cycle import cheapest_cycle, fastest_cycle
+from ir_planner.cycle import SteadyProblem, cheapest_cycle, fastest_cycle
 from ir_planner.robots import RobotsPlan, plan_robots
 from ir_recorder.analysis.tending import tending_of
 from ir_studies.cells import CellAnswer, read_instances, solve_cell, written
@@ -56,6 +56,7 @@ PARTS_PER_HOUR = 30.0
 CYCLES = 4
 MACHINES = 6
 STEADY_SECONDS = 60.0  # of processor time for a cycle
+PERIODS = (1.02, 1.3)  # times the shortest
 BRUTE = 4  # machines of which all orders are tried
 
 
@@ -77,13 +78,14 @@ class Row:
 
 @dataclass(frozen=True)
 class SteadyRow:
-    """A drawn cell of one robot: joules of the cycle, gap [%], what brute force finds (nan: too
-    many orders), processor seconds of the cheapest cycle.
+    """A drawn cell of one robot: most seconds a part, joules of the cycle, gap [%], those of brute
+    force (nan: too many orders), processor seconds of the cheapest cycle.
     """
 
     machines: int
     units: int
     seed: int
+    period: float
     joules: float
     gap: float
     brute: float
@@ -261,24 +263,31 @@ def robots_claims(rows: list[RobotsRow], schedules: int) -> list[Claim]:
 
 
 def steady_rows(seeds: int) -> Iterator[SteadyRow]:
-    """Drawn machines, 2 % above the period of the shortest cycle."""
+    """Drawn machines, 2 and 30 % above the period of the shortest cycle."""
     for machines in range(2, MACHINES + 1):
         for seed in range(seeds):
             problem = drawn_machines(seed, machines, 3)
             fastest = fastest_cycle(problem)
             assert fastest is not None
-            period = 1.02 * fastest.period
-            brute = least_by_orders(problem, period) if machines <= BRUTE else np.nan
-            for units in (1, 2):
-                begin = time.process_time()
-                cycle = cheapest_cycle(problem, period=period, units=units, stopped=_late(begin))
-                seconds = time.process_time() - begin
-                joules = np.nan if cycle is None else cycle.joules
-                gap = 100.0 if cycle is None else 100.0 * (joules - cycle.bound) / joules
-                known = brute if units == 1 else np.nan
-                row = SteadyRow(machines, units, seed, joules, gap, known, seconds)
-                print(line_of(asdict(row)), flush=True)
-                yield row
+            for over in PERIODS:
+                yield from steady_pair(problem, machines, seed, over * fastest.period)
+
+
+def steady_pair(
+    problem: SteadyProblem, machines: int, seed: int, period: float
+) -> Iterator[SteadyRow]:
+    """The cheapest cycles of one and of two parts within a period a part [s]."""
+    brute = least_by_orders(problem, period) if machines <= BRUTE else np.nan
+    for units in (1, 2):
+        begin = time.process_time()
+        cycle = cheapest_cycle(problem, period=period, units=units, stopped=_late(begin))
+        seconds = time.process_time() - begin
+        joules = np.nan if cycle is None else cycle.joules
+        gap = 100.0 if cycle is None else 100.0 * (joules - cycle.bound) / joules
+        known = brute if units == 1 else np.nan
+        row = SteadyRow(machines, units, seed, period, joules, gap, known, seconds)
+        print(line_of(asdict(row)), flush=True)
+        yield row
 
 
 def _late(begin: float) -> Callable[[], bool]:

@@ -8,6 +8,8 @@ import itertools
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from threading import Event
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +23,9 @@ from ir_description import (
     load_cell,
 )
 from ir_msgs_py.report import PlannedMovement
-from ir_planner import Planner, RequestError, SteadyPlan
+from ir_planner import CancelledError, Planner, RequestError, SteadyPlan
+from ir_planner.cycle import fastest_cycle
+from ir_planner.flexible import steady_plan
 from ir_planner.flexible.steady_plan import machine_bars
 
 CELL = load_cell("flexible")
@@ -78,6 +82,33 @@ def test_bars_of_a_machine_are_its_work_and_no_more_parts_than_it_works_on() -> 
         for moment in np.linspace(0.0, plan.cycle.period, 500):
             working = sum(begin < moment < begin + length for begin, length in bars[name])
             assert working <= capacity
+
+
+@pytest.fixture
+def searching(monkeypatch: pytest.MonkeyPatch) -> Event:
+    """Set when the search for a cycle begins."""
+    begun = Event()
+
+    def fastest(*what: Any, **named: Any) -> Any:
+        begun.set()
+        return fastest_cycle(*what, **named)
+
+    monkeypatch.setattr(steady_plan, "fastest_cycle", fastest)
+    return begun
+
+
+def test_the_search_for_a_cycle_ends_on_request(searching: Event) -> None:
+    with pytest.raises(CancelledError):
+        Planner(CELL).plan_steady_cycle(parts_per_hour=30.0, cancelled=searching.is_set)
+
+
+def test_two_parts_a_cycle_are_searched_for_until_the_time_is_up(searching: Event) -> None:
+    planner = Planner(CELL, clock=lambda: 1e6 * searching.is_set())
+    plan = planner.plan_steady_cycle(parts_per_hour=30.0, units=2)
+    assert plan.info.truncated
+    assert plan.cycle is not None
+    assert plan.cycle.units == 1
+    assert plan.joules == pytest.approx(at_thirty().joules, rel=SETTLED)
 
 
 def test_a_schedule_alone_has_no_run() -> None:

@@ -296,18 +296,18 @@ def _least(
     least bound first. once: a cycle of one unit, which may be made again and again.
     """
     best = None if once is None else once.repeated(units)
-    models = []
+    contents = []
     for full in product(*(range(places + 1) for places in problem.places)):
         model = _Model(problem, units, period, full, fastest=fastest)
         if model.possible:
-            relaxed = model.program.relaxed()
-            models.append((relaxed.bound, full, model))
+            contents.append((model.program.relaxed().bound, full))
     bound = np.inf
-    for relaxed, _, model in sorted(models, key=lambda each: each[:2]):
+    for relaxed, full in sorted(contents):
         limit = np.inf if best is None else best.joules * (1.0 - _EXACT)
         if relaxed >= limit or (stopped is not None and stopped()):
             bound = min(bound, relaxed)
             continue
+        model = _Model(problem, units, period, full, fastest=fastest)
         cycle, proved = model.solve(stopped, limit)
         bound = min(bound, max(proved, relaxed))
         best = cycle or best

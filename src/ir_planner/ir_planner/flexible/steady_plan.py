@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -355,9 +355,10 @@ class _Chosen:
 class _TendingModel:
     """The linear problem of a route, and its solutions as certified movements."""
 
-    def __init__(self, request: ProgramRequest, tending: TendedRoute) -> None:
+    def __init__(self, request: ProgramRequest, tending: TendedRoute, work: Work) -> None:
         self.request = request
         self.tending = tending
+        self._work = work
         visits = tending.route.visits
         self.visits = visits
         cell = request.cell
@@ -417,22 +418,35 @@ class _TendingModel:
 
     def fastest(self, units: int) -> SteadyCycle:
         """The fastest cycle of at most so many units."""
-        cycles = [fastest_cycle(self.problem, units=count) for count in range(1, units + 1)]
+        cycles = [
+            fastest_cycle(self.problem, units=count, stopped=self._stopped(count))
+            for count in range(1, units + 1)
+        ]
+        self._work.check()
         found = [cycle for cycle in cycles if cycle is not None]  # without a bound there is one
         return min(found, key=lambda cycle: cycle.seconds_per_part)
 
     def cheapest(self, period: float, units: int) -> _Chosen | None:
         """The cheapest cycle of at most so many units within a period a part [s]."""
         found = [self._cheapest(period, count) for count in range(1, units + 1)]
+        self._work.check()
         known = [chosen for chosen in found if chosen is not None]
         return min(known, key=lambda chosen: chosen.cycle.joules_per_part, default=None)
+
+    def _stopped(self, units: int) -> Callable[[], bool]:
+        """Whether a search for a cycle of so many units ends: on request, and where there is one of
+        fewer units when the time is up.
+        """
+        work = self._work
+        return lambda: work.cancelled() or (units > 1 and work.late)
 
     def _cheapest(self, period: float, units: int) -> _Chosen | None:
         """Of exactly so many units, of movements that are certified at the durations that the
         linear problem chose, and its waits once more for these; None where there is none.
         """
-        cycle = cheapest_cycle(self.problem, period=period, units=units)
-        if cycle is None:
+        stopped = self._stopped(units)
+        cycle = cheapest_cycle(self.problem, period=period, units=units, stopped=stopped)
+        if cycle is None or self._work.cancelled():
             return None
         movements = self._realised(cycle)
         again = cheapest_cycle(
@@ -494,7 +508,7 @@ class _Ways:
             except StageError as failed:
                 failures.append(failed)
                 continue
-            self._models.append(_TendingModel(own, tending))
+            self._models.append(_TendingModel(own, tending, context.journal.work))
         if not self._models:
             raise failures[0]
 

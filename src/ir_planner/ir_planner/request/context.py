@@ -62,11 +62,16 @@ class Work:
         return max(self.max_iterations - self.iterations, 0)
 
     @property
-    def exhausted(self) -> bool:
-        """Whether searches must end: by work, or cut by time (then `truncated`)."""
+    def late(self) -> bool:
+        """Whether the time is up (then `truncated`)."""
         if self.clock() >= self.deadline:
             self.truncated = True
-        return self.truncated or self.iterations >= self.max_iterations
+        return self.truncated
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether searches must end: by work, or cut by time."""
+        return self.late or self.iterations >= self.max_iterations
 
 
 @dataclass
