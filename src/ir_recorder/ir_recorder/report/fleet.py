@@ -700,7 +700,8 @@ def _months(members: Sequence[Member]) -> str:
         made = f"{origin}, {counted(len({m.robot for m in own}), 'robot')}"
         if len(own) > 1:
             made += f", {counted(len(own), 'recording')}"
-        ends = f"<small>{percent(min(shares))} to {percent(max(shares))}</small>"
+        least = percent(min(shares)).removesuffix(" %")
+        ends = f"<small>{least} to {percent(max(shares))}</small>"
         rows.append(
             (
                 f"{text(month)}<small>{text(made)}</small>",

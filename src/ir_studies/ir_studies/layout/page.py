@@ -361,7 +361,7 @@ def _bars(finals: Sequence[Sequence[Final]], costs: Costs) -> str:
     hint = (
         f"Zero is the layout as given: {kilowatt_hours(like.mean())} a cycle, "
         f"{yearly_money(cost, costs.currency)} a year. Right of it a placement saves. Whisker: "
-        "90 % interval of the difference. Below: what stands how far from where it is given."
+        "90 % interval of the difference. Small: what stands how far from where it is given."
     )
     drawn = bars(rows, "saved a year")
     return f'{drawn}<p class="hint">{text(hint)}</p>'
