@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from ir_description import (
     CellFileError,
+    InvalidValueError,
     ProgramStep,
     cell_from_yaml,
     cell_hash,
@@ -116,6 +117,12 @@ def test_room_in_a_machine_survives_its_file_and_changes_no_movement(
     again = cell_from_yaml(cell_to_yaml(cell)).machine("lathe")
     assert (again.capacity, again.buffer) == (capacity, buffer)
     assert cell_hash(cell) == cell_hash(FLEXIBLE)
+
+
+@pytest.mark.parametrize("value", [1.5, 0, 9, float("nan"), "two"])
+def test_a_capacity_is_a_whole_number_of_parts(value: float) -> None:
+    with pytest.raises(InvalidValueError, match="capacity of lathe"):
+        replace(FLEXIBLE.machine("lathe"), capacity=value)
 
 
 @pytest.mark.parametrize("line", ["capacity: 0", "capacity: 5", "capacity: 1.5", "buffer: -1"])

@@ -146,6 +146,11 @@ class ProcessTimes:
         return self.low + share * (self.high - self.low)
 
 
+def _check_parts(value: float, low: int, name: str) -> None:
+    if in_range(value, low, CAPACITY_MAX, "parts", name) % 1.0:
+        raise InvalidValueError(f"{name} is {value:g} parts, must be a whole number")
+
+
 @dataclass(frozen=True, eq=False)
 class Equipment:
     """A machine. pose (4, 4) in the world; bodies and zone_in_equipment in the machine's frame.
@@ -173,8 +178,8 @@ class Equipment:
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", frozen_pose(self.pose, f"pose of {self.name}"))
         in_range(self.process, 0.0, PROCESS_MAX, "s", f"process of {self.name}")
-        in_range(self.capacity, 1, CAPACITY_MAX, "parts", f"capacity of {self.name}")
-        in_range(self.buffer, 0, CAPACITY_MAX, "parts", f"buffer of {self.name}")
+        _check_parts(self.capacity, 1, f"capacity of {self.name}")
+        _check_parts(self.buffer, 0, f"buffer of {self.name}")
         names = {body.name for body in self.bodies}
         if len(names) != len(self.bodies):
             raise InvalidValueError(f"equipment {self.name} names a body twice")
