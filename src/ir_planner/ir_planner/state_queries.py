@@ -79,6 +79,9 @@ def asked_states(scene: PlanningScene, q: FloatArray, margin: float, station: st
 def _pairs(
     near: MinDistance, scene: PlanningScene, allowed: BoolArray
 ) -> tuple[DistancePair | None, ...]:
+    """The nearest pair of each state, None where there is none; allowed (Z,): pairs that the
+    station lets come nearer.
+    """
     pairs = scene.collision.pairs
     return tuple(
         DistancePair(

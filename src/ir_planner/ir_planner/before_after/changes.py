@@ -268,6 +268,9 @@ def _paused(before: CostedHop, after: CostedHop) -> tuple[int, str]:
 
 
 def _moved(before: CostedHop, after: CostedHop) -> tuple[int, str]:
+    """What changed of a movement, as the kind of work that it takes and a sentence: another
+    configuration, another path, other times, or other speeds on the same path.
+    """
     times = f"{after.seconds:.2f} s instead of {before.seconds:.2f} s"
     # one movement, at rest at its corners as well
     along = before.steps[0].kind == MovementKind.CARTESIAN

@@ -341,6 +341,9 @@ def _same_load(a: Load, b: Load) -> bool:
 
 
 def _stretch(one: EvaluatedStep, process: CellPath | None) -> TodayMotion:
+    """An evaluated step of the KRL program as a motion of today's program; process: the path that
+    it drives under an output.
+    """
     step = one.step
     end = np.asarray(step.trajectory.positions[-1])
     works = bool(step.outputs or step.waits_for)

@@ -479,6 +479,9 @@ def _in_place(poses: list[FloatArray], name: str, speed: float, path: CartesianP
 def _moving(
     segment: CartesianSegment, poses: list[FloatArray], name: str, speed: float
 ) -> PathPart:
+    """A segment in which the tool moves: its curve in space, and how the orientation turns along
+    it. Raises RequestError where three points make no circle.
+    """
     places = np.array([pose[:3, 3] for pose in poses])
     curve: PlaceCurve
     if segment.kind == LINE:

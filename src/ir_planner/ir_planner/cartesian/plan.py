@@ -355,6 +355,9 @@ def plan_path(
 def _planned(
     path: CartesianPath, start: FloatArray | None, t1: bool, context: Context
 ) -> CartesianPlan:
+    """Draw the path, drive it at least cost, and measure how far the tool may be off it. Raises
+    PathRefusedError.
+    """
     if start is not None:
         cell = context.scene.cell
         start = within_limits(start, cell, "start", StatusCode.START_STATE_INVALID)

@@ -80,6 +80,9 @@ def _on_bus(
     times: FloatArray,
     axes: FloatArray,
 ) -> MovementEnergy:
+    """Joules of a movement from what its axes drew of the common bus: the rectifier loses its share
+    in either direction, and the base load of controller and tool is added. Steps last dt s.
+    """
     base = scene.base_watts
     efficiency = scene.drives.rectifier_efficiency
     watts = np.where(bus.mains > 0.0, bus.mains / efficiency, bus.mains * efficiency) + base

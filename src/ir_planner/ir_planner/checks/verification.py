@@ -268,6 +268,7 @@ def _of_part(
     scene: PlanningScene,
     station: Stops,
 ) -> Violation | None:
+    """The first pair that is not proved free within a span [s] of the trajectory; None: all are."""
     coefficients, durations = polynomials_between(trajectory, *span)
     if len(durations) == 0:
         return None
@@ -315,6 +316,9 @@ def _violation(
     scene: PlanningScene,
     station: Stops,
 ) -> Violation:
+    """A pair that comes too near within an interval [s], measured at configuration q (n,) at its
+    end; z: number of the pair, threshold (Z,) m.
+    """
     pair = pair_value(scene, q, z, bool(scene.own_distance(station)[z]))
     needed = float(threshold[z]) + PROOF_TOLERANCE
     excess = needed - pair.distance

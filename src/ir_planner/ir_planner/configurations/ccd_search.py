@@ -165,6 +165,9 @@ class _Descent:
         self.outcome: list[str] = []
 
     def run(self, starts: FloatArray, work: Work) -> Descent:
+        """Sweep from all starts (N, n) at once until each has arrived, is given up, or work and
+        sweeps are used. Rows that end are taken out of all arrays together.
+        """
         q = starts.copy()
         found = [starts[:0]]
         start = np.arange(len(starts))

@@ -350,6 +350,9 @@ class _Model:
             self._build(fastest=fastest)
 
     def _build(self, *, fastest: bool) -> None:
+        """Variables of the linear program (begins, durations, waits, successors), then its rows:
+        one activity at a time, and the order in which parts pass each machine.
+        """
         problem = self.problem
         self.period = self.program.variable(self.least, self.most, cost=float(fastest))
         self.start = {

@@ -156,6 +156,9 @@ class RouteSteps:
     def _exact(
         self, part: HopPart, route: Route, movements: Mapping[UnitKey, Movement], unit: int
     ) -> Movement:
+        """A movement of the cycle in the scene of its hop, where the robot and the machines hold
+        what they do then; proved once for each. Raises StageError.
+        """
         ends = [self._station(route.name(part.hop - 1)), self._station(route.name(part.hop))]
         if part.kind != ACROSS:
             ends = [ends[part.kind == ENTER]] * 2

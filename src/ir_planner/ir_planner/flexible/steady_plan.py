@@ -456,6 +456,9 @@ class _TendingModel:
         return _Chosen(again, movements, cycle.bound)
 
     def _realised(self, cycle: SteadyCycle) -> dict[UnitKey, Movement]:
+        """The movement that each activity and empty hop of the cycle is driven by: of its column,
+        the one that takes the seconds that the linear program chose.
+        """
         columns = self.tending.columns
         hops = self._hops()
         movements = {

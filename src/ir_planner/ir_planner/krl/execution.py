@@ -360,6 +360,9 @@ class _Drive:
             insort(self._later, _Event(at + command.pulse, back, ends_pulse=True), key=_at)
 
     def _motion(self, motion: Motion, triggered: Sequence[SetOutput]) -> None:
+        """Drive one motion as the controller would; the first one, a PTP, says where the robot
+        stands. A motion to where it already stands only sets its outputs.
+        """
         if not self._through:
             self._carry(motion.payload, motion.place)
         if not self._on_path:
@@ -396,6 +399,9 @@ class _Drive:
                 self._set(trigger)
 
     def _block(self, block: SplineBlock, triggered: Sequence[SetOutput]) -> None:
+        """Drive a spline block: as timed points where it gives them, by the times of its parts, or
+        as one curve at the speeds of its first part.
+        """
         if not self._through:
             self._carry(block.parts[0].payload, block.place)
         if not self._on_path:
@@ -478,6 +484,9 @@ class _Drive:
         triggered: Sequence[SetOutput],
         least: float = 0.0,
     ) -> None:
+        """Drive a curve: at once where it ends at rest, joined with the motions before it where
+        corners are blended. least [s]: it takes at least so long.
+        """
         self._carry(_payload_of(command), command.place)
         share = 1.0 if self._blend is None and command.blend is None else _BLENDED_JERK
         target = _target_of(command)

@@ -198,6 +198,9 @@ class _Job:
         return parts, len(back(parts))
 
     def _written(self, comments: Sequence[str], header: Sequence[str]) -> Texts:
+        """The texts of the program in the chosen style: its steps in order, with the numbers of
+        tools and bases.
+        """
         carried = _carried(self._steps, self._loads)
         parts = [
             part
@@ -222,6 +225,7 @@ class _Job:
         )
 
     def _parts(self, step: PlannedMovement, comment: str, carried: int) -> list[WrittenStatement]:
+        """The statements of a step, with the base of its machine where points are touched up."""
         waits = WrittenSignals(wait_for=_signals(step.wait_for))
         parts: list[WrittenStatement] = [waits] if step.wait_for else []
         if step.is_pause:
@@ -352,6 +356,9 @@ class _Job:
         return f"{k + 1} {called(step)}: {costs}{clear}"
 
     def _header(self, after: Sequence[PlannedMovement], texts: Texts) -> list[str]:
+        """The comments at the begin of the source: cell, tools and bases, what was planned and what
+        the controller drives, and what the plant has to know.
+        """
         cell = self._scene.cell
         planned = _total(self._steps)
         driven = _total(after)

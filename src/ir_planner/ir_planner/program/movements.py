@@ -282,6 +282,9 @@ class Movements:
         return self._across(part, inside) if part.kind == ACROSS else self._along_line(part, inside)
 
     def _across(self, part: HopPart, context: Context) -> Movement | Failure:
+        """The movement of a hop between zones: past the places of its step, near a known one, or by
+        a search; or why there is none.
+        """
         near = _known(self._near.across, part)
         timed = context.planned_by(self._planner(part))
         via = self.route.at(part.hop).step.via
@@ -326,6 +329,9 @@ class Movements:
             return error.status, None
 
     def _along_line(self, part: HopPart, context: Context) -> Movement | Failure:
+        """The movement of a hop into or out of a zone along its service line: near a known one, or
+        timed anew; or why there is none.
+        """
         entry = part.kind == ENTER
         station = self.route.name(part.hop if entry else part.hop - 1)
         driven = self.nodes(part)[0].driven

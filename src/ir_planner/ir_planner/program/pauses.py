@@ -257,6 +257,9 @@ def rests_at(q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> Res
 
 @lru_cache(maxsize=64)  # a program is compared with many of the same pauses
 def _rests_at(posture: tuple[float, ...], scene: PlanningScene, times: TransitionTimes) -> Rests:
+    """What each resting mode draws at a posture (n,) and what it takes to enter, stay and leave,
+    for pauses of programs.
+    """
     q = np.array(posture)
     return Rests(
         mode_watts(MOTORS, q, scene),

@@ -483,6 +483,9 @@ def _shown(rests: Rests, steps: Steps, most: float) -> tuple[tuple[str, ...], tu
 
 
 def _mode(name: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes) -> PowerMode:
+    """A power mode at configuration q (n,), in PROFIenergy's terms: times and joules of the way in
+    and out, and the pause from which it pays.
+    """
     data = scene.power.mode(name)
     motors = mode_watts(MOTORS, q, scene)
     enter = times.enter(name)

@@ -95,6 +95,9 @@ class ArmProgram:
         return replace(self, columns=columns)
 
     def _below(self, k: int, watts: float) -> MovementColumn:
+        """Movements of the k-th column whose peak is at most `watts`; where none is, the slowest
+        one stretched as little as helps. Raises StageError.
+        """
         known = self.columns[k].movements
         kept = [each for each in known if each.report.peak_power <= watts]
         slowest = known[-1]
@@ -354,6 +357,9 @@ def _arm(
     steps: Sequence[PlannedMovement],
     columns: Sequence[MovementColumn],
 ) -> ArmProgram:
+    """A planned program of one robot as movements and stops that repeat. Raises RequestError where
+    it ends elsewhere than it begins, or handles something while it stands.
+    """
     first = columns[0].movements[0]
     end = columns[-1].movements[0].trajectory.positions[-1]
     begin = first.trajectory.positions[0]

@@ -279,6 +279,9 @@ class _Joint:
     def _answer(
         self, zones: tuple[ExclusiveZone, ...], chosen: Chosen, first: JointCycle, fastest: float
     ) -> RobotsPlan:
+        """The answer: durations as chosen, the cheapest order and waits for them, signals that keep
+        the order, and a program for each robot.
+        """
         fixed = [arm.work(own) for arm, own in zip(self.arms, chosen, strict=True)]
         cycle = cheapest_joint(fixed, zones, first.period + _ROUNDING)
         assert cycle is not None  # no movement takes longer than was chosen

@@ -154,6 +154,9 @@ def plan_service(
 def _search(
     request: ServiceRequest, context: Context, searches: Mapping[str, ExitSearch]
 ) -> tuple[Status, tuple[ServiceCandidate, ...]]:
+    """Ways out from one work configuration after the other, those first that rank first, until one
+    has a certified candidate; the status of the last that failed.
+    """
     journal = context.journal
     method = known_method(context.options.planner_id)
     with journal.stage("configurations") as notes:

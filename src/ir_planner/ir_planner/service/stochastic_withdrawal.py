@@ -203,6 +203,9 @@ class _Walker:
         self.best_zone = float(self.area.zone_distance(first[None])[0])
 
     def run(self, wanted: int) -> Walk:
+        """Generations of eq. (7) from the grasp, until so many paths lead outside, all copies are
+        lost, or the work is used.
+        """
         n = len(self.nodes[0])
         count = self.settings.population
         population = ExitPopulation(

@@ -145,6 +145,9 @@ def optimize_trajectory(
 
 
 def _check(original: JointTrajectory, scene: PlanningScene) -> None:
+    """Refuse a trajectory with too few or too many points, with ends beyond a limit, or in motion
+    at an end. Raises RequestError.
+    """
     count = len(original.times_ns)
     if not 2 <= count <= POINTS_MAX:
         raise RequestError(

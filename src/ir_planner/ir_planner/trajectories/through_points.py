@@ -123,6 +123,9 @@ def _within(reference: Reference, scene: PlanningScene) -> Reference:
 
 
 def _followed(reference: Reference, context: Context) -> Movement:
+    """The spline through the points where it is certified, else straight movements that stop at
+    each; two points are a PTP.
+    """
     points = distinct(reference.points)
     journal = context.journal
     if len(points) < 3:

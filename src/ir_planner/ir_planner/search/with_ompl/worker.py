@@ -64,6 +64,9 @@ def main(descriptor: int) -> None:
 
 
 def _answer(connection: Connection, parent: int) -> None:
+    """In the process of a request: read the problem, solve it, write the answer, and wait to be
+    ended.
+    """
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)  # also where this process is stopped
     if os.getppid() != parent:
         return
