@@ -24,7 +24,7 @@ from _truth_section import Asked, Found
 from ir_cli.excitation_programme import ExcitationRequest as Excitation
 from ir_cli.excitation_programme import Programme, plan_programme
 from ir_description import Cell, Load, PowerParameters, data_sheet, load_power_data
-from ir_description.robot import interval_over
+from ir_description.robot import centre_deviations, interval_over
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Goal, Planner, PlannerSettings
@@ -72,8 +72,10 @@ def driven(asked: Asked) -> tuple[Found, list[bool]]:
     tests = [Test(m.trajectory, m.load) for m in movements_of(planner)]
     tests = [_to_first(planner, tests[0]), *tests]
     loads = {*(test.load for test in tests), *(step.load for step in programme.steps)}
+    robot = planner.cell.robot
+    fitted = prior.with_centres(centre_deviations(robot))  # as `ir energy fit` does
     rig = _Rig(
-        planner.cell, prior, programme, tests, {load: planner.scene(load).loads for load in loads}
+        planner.cell, fitted, programme, tests, {load: planner.scene(load).loads for load in loads}
     )
     plants: list[Plant] = over_seeds(rig.plant, range(asked.seeds))
     off = [] if asked.quick else over_seeds(rig.stepped, range(min(STEPPED, asked.seeds)))

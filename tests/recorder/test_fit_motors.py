@@ -13,7 +13,7 @@ import pytest
 
 from ir_description import PowerParameters, RobotModel, data_sheet_of, load_cell, load_robot
 from ir_recorder.errors import RecorderError
-from ir_recorder.fit import Estimate, LeftOut, fit, left_out, recommendation, shaft_work
+from ir_recorder.fit import Estimate, LeftOut, doubts, fit, left_out, recommendation, shaft_work
 from ir_recorder.fit.data import DataSource, fit_data, without_turns
 from ir_recorder.measure import PowerModel, Samples, samples_of
 from ir_recorder.measure.arm import arm_torques
@@ -128,6 +128,30 @@ def test_axes_that_move_in_one_recording_alone_are_left_out_in_quarters() -> Non
     assert [row.part for row in fitted] == [f"part {k} of 4" for k in range(1, 5)]
     assert max(abs(row.errors[0]) for row in fitted) < 0.03
     assert "plan with the fit" in recommendation(rows)
+
+
+def test_what_friction_holds_at_rest_spoils_no_fit() -> None:
+    robot = load_robot("kr6_r900_2")
+    model, prior = model_of(robot)
+    truth = truth_of(prior, 8)
+    rng = np.random.default_rng(8)
+    runs = []
+    for axis in range(robot.n):
+        run = told(held(moved(robot, axis, 6.0), (axis,)), model, truth)
+        assert run.effort is not None
+        holds = rng.uniform(-1.0, 1.0, (6, robot.n)).repeat(len(run) // 6, axis=0)
+        holds *= truth[prior.places("coulomb")] * (np.arange(robot.n) != axis)
+        runs.append(replace(run, effort=run.effort + holds))
+    estimate = Estimate(runs, list("abcdef"), model, prior, motors=True)
+    found = estimate.result("x")
+    unknown = moved(robot, 9)
+    prepared = model.prepare(unknown)
+    true, own = (
+        shaft_work(model.torque(mean, prepared), prepared.speed)
+        for mean in (truth, found.parameters.mean)
+    )
+    assert abs(own / true - 1.0) < 0.01
+    assert doubts(estimate, found).sentences == ()
 
 
 def test_a_data_sheet_is_not_given_the_gains_of_what_it_has_not_seen() -> None:

@@ -16,6 +16,7 @@ from ir_description import PowerParameters
 from ir_description.robot import IDLE, IDLE_WATTS
 from ir_recorder.measure import PowerModel, Samples
 from ir_recorder.measure.power_model import Prepared
+from ir_recorder.measure.samples import MOVING
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 WINDOW = 5  # samples whose mean is one residual: 50 ms
@@ -127,7 +128,9 @@ class MeterChannel:
 
 
 class Motors:
-    """Torques of the motors as seen at the joints, or their currents; one group per axis.
+    """Torques of the motors as seen at the joints, or their currents; a group per axis that moves,
+    then one per axis that stands: there friction holds with whatever it is asked for, up to where
+    it breaks away.
 
     The last 2 n values of x are an offset per axis in Nm (of a sensor, or of a centre of mass) and,
     per axis, units of what the controller says per Nm: 1 for torques.
@@ -151,9 +154,10 @@ class Motors:
             [run.first + rows for run, rows in zip(runs, self._rows, strict=True)]
         )
         self.window = np.tile(windows, self.n)
-        self.group = np.repeat(np.arange(self.n), len(windows))
+        stands = np.abs(self.speed.T) <= MOVING
+        self.group = (np.arange(self.n)[:, None] + self.n * stands).ravel()
         self.largest = np.maximum(np.abs(self._table).max(axis=0, initial=0.0), 1e-9)
-        self.least = _LEAST_SHARE * self.largest
+        self.least = np.tile(_LEAST_SHARE * self.largest, 2)
 
     @property
     def currents(self) -> bool:

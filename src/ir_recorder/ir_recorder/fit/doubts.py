@@ -384,8 +384,13 @@ def _of_torques(estimate: Estimate) -> Iterator[str]:
     measured = motors.measured.reshape(motors.n, rows)
     moving = np.concatenate([by_window(run.samples.moving.astype(float)) for run in estimate.runs])
     inside = moving[motors.window[:rows]] > 0.0
-    for joint, own, theirs in zip(estimate.prior.joints, measured, predicted, strict=True):
-        share = _explained(own[inside], theirs[inside])
+    moves = motors.group.reshape(motors.n, rows) < motors.n
+    for j, joint in enumerate(estimate.prior.joints):
+        # where an axis stands, friction takes what it is asked for: nobody can explain that
+        missing = (measured[j] - predicted[j])[inside & moves[j]]
+        share = 1.0
+        if len(missing) >= _FEWEST and measured[j][inside].var() > 0.0:
+            share = float(1.0 - np.square(missing).mean() / measured[j][inside].var())
         if share < EXPLAINED:
             what = "current" if motors.currents else "torque"
             yield (

@@ -209,7 +209,8 @@ class Fit:
     """What was found. parameters: with covariance; determined (P,): which of them the data
     determine; the others are as before. movements: residuals. time (W,) s, measured, before, after
     (W,) W: of windows with watts. noise [W]: of a window at rest and in motion (NaN without a
-    meter), torque_noise (n,) of each axis, in what the controller says (none without).
+    meter), torque_noise (n,) of each axis in motion, in what the controller says (none
+    without).
     inflation: of the noise, so that the covariance explains the residuals of movements and rests.
     friction_scale: times the deviation of friction before. offsets (n,) Nm and scales (n,) A/Nm of
     the motors, where these were fitted.
@@ -407,7 +408,7 @@ class Estimate:
             before,
             after,
             (float(noise[0]), float(noise[1])) if meters else (np.nan, np.nan),
-            tuple(noise[meters:].tolist()),
+            tuple(noise[meters : meters + n if self.motors is not None else meters].tolist()),
             inflation,
             self._friction_scale,
             tuple(extra[:n].tolist()),
@@ -555,6 +556,9 @@ class Estimate:
             if len(own):
                 noise[k] = max(float(np.sqrt(np.mean(own**2))), self._least[k])
             correlated[k] = correlation_length(own)
+        if self.motors is not None:
+            moving, standing = noise[-2 * self.motors.n :].reshape(2, -1)
+            np.maximum(moving, standing, out=standing)
         return noise, correlated
 
     def _folds(self) -> IntArray:
