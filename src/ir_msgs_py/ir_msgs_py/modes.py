@@ -236,39 +236,25 @@ PREFIX = "transitions."  # of the parameters
 _WEEK = 604_800.0
 
 
+def _seconds(default: float, sentence: str) -> float:
+    return setting(default, sentence, unit="s", minimum=0.0, maximum=_WEEK)
+
+
 @dataclass(frozen=True)
 class TransitionTimes:
     """Seconds into a rest (enter), out of it to motors on (leave), and at least in it
     (minimum_stay).
     """
 
-    stand_on_brakes_enter: float = setting(
-        0.3, "Motors to brakes.", unit="s", minimum=0.0, maximum=_WEEK
-    )
-    stand_on_brakes_leave: float = setting(
-        0.7, "Brakes to motors.", unit="s", minimum=0.0, maximum=_WEEK
-    )
-    stand_on_brakes_minimum_stay: float = setting(
-        1.0, "Shortest stay on brakes.", unit="s", minimum=0.0, maximum=_WEEK
-    )
-    bus_power_off_enter: float = setting(
-        3.0, "Into Bus Power Off.", unit="s", minimum=0.0, maximum=_WEEK
-    )
-    bus_power_off_leave: float = setting(
-        20.0, "Bus Power Off to motors.", unit="s", minimum=0.0, maximum=_WEEK
-    )
-    bus_power_off_minimum_stay: float = setting(
-        2.0, "Shortest Bus Power Off.", unit="s", minimum=0.0, maximum=_WEEK
-    )
-    hibernation_enter: float = setting(
-        60.0, "Into hibernation.", unit="s", minimum=0.0, maximum=_WEEK
-    )
-    hibernation_leave: float = setting(
-        120.0, "Hibernation to motors.", unit="s", minimum=0.0, maximum=_WEEK
-    )
-    hibernation_minimum_stay: float = setting(
-        120.0, "Shortest hibernation.", unit="s", minimum=0.0, maximum=_WEEK
-    )
+    stand_on_brakes_enter: float = _seconds(0.3, "Motors to brakes.")
+    stand_on_brakes_leave: float = _seconds(0.7, "Brakes to motors.")
+    stand_on_brakes_minimum_stay: float = _seconds(1.0, "Shortest stay on brakes.")
+    bus_power_off_enter: float = _seconds(3.0, "Into Bus Power Off.")
+    bus_power_off_leave: float = _seconds(20.0, "Bus Power Off to motors.")
+    bus_power_off_minimum_stay: float = _seconds(2.0, "Shortest Bus Power Off.")
+    hibernation_enter: float = _seconds(60.0, "Into hibernation.")
+    hibernation_leave: float = _seconds(120.0, "Hibernation to motors.")
+    hibernation_minimum_stay: float = _seconds(120.0, "Shortest hibernation.")
 
     def __post_init__(self) -> None:
         check_settings(self)
