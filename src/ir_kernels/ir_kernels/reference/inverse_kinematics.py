@@ -25,6 +25,8 @@ def arm_branches(geometry: WristGeometry, centre: FloatArray) -> tuple[FloatArra
     Where the arm is stretched both elbows are the same: only the first exists. On axis 1 any q1
     serves: 0 is taken.
     """
+    # The arm lies in a plane through axis 1, `lateral` m beside it: points of that plane are
+    # complex numbers z + i reach, and upper arm and forearm are two of them.
     x, y, z = geometry.plane @ (centre - geometry.axis_point).T
     N = len(centre)
     q = np.empty((N, 4, 3))
@@ -38,8 +40,11 @@ def arm_branches(geometry: WristGeometry, centre: FloatArray) -> tuple[FloatArra
     opening = np.angle(np.conj(geometry.upper_arm) * geometry.forearm)
     for back in (0, 1):
         reach = geometry.forward * (-forward if back else forward)
+        # q1 turns the plane to the wrist centre, over the base for `back`
         q1 = np.where(radius > 0.0, np.arctan2(y, x), 0.0) - np.arctan2(d, reach)
         target = (z + 1j * reach) - geometry.shoulder
+
+        # the triangle of upper arm, forearm and target: law of cosines for the bend of the elbow
         distance = np.abs(target)
         cosine = (distance**2 - upper**2 - fore**2) / (2.0 * upper * fore)
         stretched = (distance > upper + fore) | (distance < abs(upper - fore))
@@ -49,7 +54,9 @@ def arm_branches(geometry: WristGeometry, centre: FloatArray) -> tuple[FloatArra
         bend = np.where(
             stretched, np.where(cosine > 0.0, 0.0, np.pi), np.arccos(np.clip(cosine, -1.0, 1.0))
         )
+
         for low in (0, 1):
+            # q2 turns upper arm and bent forearm together onto the target
             turn = (-bend if low else bend) - opening
             elbow = geometry.upper_arm + geometry.forearm * np.exp(1j * turn)
             branch = 2 * back + low
@@ -77,6 +84,8 @@ def wrist_branches(
     )
     # = exp(z4 q4) exp(z5 q5) exp(z6 q6)
     W = np.swapaxes(before, 1, 2) @ hand @ geometry.hand[:3, :3].T
+
+    # Axis 6 is turned by q4 and q5 only: its components along axes 4 and 5 and across give both.
     e3 = np.cross(z[3], z[4])
     pointing = W @ z[5]
     c = pointing @ z[3]
@@ -90,7 +99,7 @@ def wrist_branches(
         sign = -1.0 if flip else 1.0
         q4 = np.where(singular, free_q4, np.arctan2(sign * a, -sign * b))
         q5 = np.arctan2(sign * s, c) - geometry.wrist_zero
-        # = exp(z6 q6)
+        # = exp(z6 q6), which turns axis 5 by q6
         rest = np.swapaxes(axis_rotation(z[3], q4) @ axis_rotation(z[4], q5), 1, 2) @ W
         turned = rest @ z[4]
         q[:, flip] = np.stack(

@@ -66,6 +66,7 @@ def project_triangle(points: FloatArray, corners: FloatArray) -> FloatArray:
     """Nearest point (N, F, 3) of each triangle (F, 3, 3): inside its prism the plane's, else the
     nearest of its sides'.
     """
+    # On each side: the foot of the perpendicular, within the side.
     start = corners
     along = corners[:, [1, 2, 0]] - start
     normal = np.cross(along[:, 0], along[:, 1])
@@ -74,6 +75,8 @@ def project_triangle(points: FloatArray, corners: FloatArray) -> FloatArray:
     on_side = start + t[..., None] * along
     nearest = np.sum((points[:, None, None] - on_side) ** 2, axis=-1).argmin(axis=-1)
     on_side = np.take_along_axis(on_side, nearest[..., None, None], axis=2)[:, :, 0]
+
+    # Within the prism over the triangle: on the inner side of all three sides.
     inside = (np.sum(offset * np.cross(normal[:, None], along), axis=-1) >= 0.0).all(axis=-1)
     height = np.sum(offset[:, :, 0] * normal, axis=-1) / np.sum(normal * normal, axis=-1)
     return np.where(inside[..., None], points[:, None] - height[..., None] * normal, on_side)
@@ -103,6 +106,8 @@ def _shallowest(
 
 def depth_hull(p0: FloatArray, p1: FloatArray, hull: Hull) -> Depth:
     """Penetration of segments (N, 3), (N, 3) into a polytope."""
+    # Directions that can be shallowest: normals of faces, and of the planes that an edge and the
+    # segment span (nothing where they are parallel: a face's normal then).
     edge = hull.vertices[hull.edges[:, 1]] - hull.vertices[hull.edges[:, 0]]
     cross = np.cross(edge[None], (p1 - p0)[:, None])
     scale = np.linalg.norm(edge, axis=1) * np.linalg.norm(p1 - p0, axis=1)[:, None]
@@ -199,6 +204,8 @@ def _nearest(
     p0: FloatArray, p1: FloatArray, project: Callable[[FloatArray], FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
     """Points (N, 3) of the segments and of the solid that are nearest to each other."""
+    # The distance of a convex set along the segment is convex: where it rises, the nearest point is
+    # before.
     d = p1 - p0
     low = np.zeros((len(p0), 1))
     high = np.ones((len(p0), 1))
@@ -224,6 +231,7 @@ def _from_solid(
     normal = unit(gap)
     crossing = distance < TOUCH
     if crossing.any():
+        # Move the segment out by its depth: it touches then, and its nearest points are witnesses.
         inside = depth(p0[crossing], p1[crossing])
         out = (inside.depth + 1e-9)[:, None] * inside.direction
         moved, on_body[crossing] = _nearest(p0[crossing] + out, p1[crossing] + out, project)
@@ -250,6 +258,9 @@ def segment_segment(a0: FloatArray, a1: FloatArray, b0: FloatArray, b1: FloatArr
 
     zero = np.zeros(len(a0))
     one = np.ones(len(a0))
+
+    # Both insides: the least |r + s da - t db|^2 has zero derivatives by s and t. Then each end of
+    # either segment with the foot of its perpendicular on the other.
     s = ratio(ab * rb - bb * ra, aa * bb - ab * ab)
     choices = [
         (s, ratio(rb + s * ab, bb)),
