@@ -374,6 +374,8 @@ def _power_planned_motion(
     times = []
     watts = []
     for begin, step in _timed_planned_motion(steps):
+        if step.duration <= 0.0:  # it is where it has to go
+            continue
         if step.trajectory is None:
             times.append(begin + np.array([0.0, step.duration]))
             watts.append(np.full(2, step.report.energy / max(step.duration, 1e-9)))
