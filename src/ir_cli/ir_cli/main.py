@@ -107,10 +107,10 @@ def _expected_errors() -> tuple[type[Exception], ...]:
     """
     from ir_recorder.errors import RecorderError
     from ir_studies.errors import StudyError
-    from ir_values.errors import DescriptionError, IrError
+    from ir_values.errors import IrError
 
     # OSError: a full disk, no permission, no descriptor left
-    return (CommandError, DescriptionError, IrError, OSError, RecorderError, StudyError)
+    return (CommandError, IrError, OSError, RecorderError, StudyError)
 
 
 if __name__ == "__main__":

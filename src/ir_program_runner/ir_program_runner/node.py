@@ -422,7 +422,7 @@ class ProgramRunnerNode(Node):
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the node until it is ended."""
-    refusals = (InvalidValueError, DescriptionError, ValueError)
+    refusals = (DescriptionError, ValueError)
     about = (
         "Runs planned programs: movements, pauses in their power modes, signals of the machines."
     )

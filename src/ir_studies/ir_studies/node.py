@@ -19,7 +19,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 
-from ir_description import DescriptionError, is_path
+from ir_description import is_path
 from ir_msgs.action import RunStudy
 from ir_msgs_py import names
 from ir_msgs_py.names import own
@@ -171,7 +171,7 @@ def _known(error: Exception) -> Status | None:
         return Status(StatusCode.PREEMPTED, "stopped; the same goal goes on from there")
     if isinstance(error, SettingsError):
         return Status(StatusCode.INVALID_GOAL_CONSTRAINTS, str(error))
-    if isinstance(error, (StudyError, RecorderError, IrError, DescriptionError, OSError)):
+    if isinstance(error, (StudyError, RecorderError, IrError, OSError)):
         return Status(StatusCode.FAILURE, str(error))
     return None
 

@@ -23,7 +23,6 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
 from ir_cli.output import table
-from ir_description import DescriptionError
 from ir_description.files import power_from_yaml
 from ir_msgs.msg import RecordedCall
 from ir_msgs_py import names
@@ -267,7 +266,7 @@ def _unless_refused(learn: Callable[[Planner], None]) -> Callable[[Planner], Non
     def learn_or_ignore(planner: Planner) -> None:
         try:
             learn(planner)
-        except (IrError, DescriptionError):
+        except IrError:
             return
 
     return learn_or_ignore

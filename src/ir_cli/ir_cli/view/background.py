@@ -11,7 +11,7 @@ from ir_cli.plan import sentences_of
 from ir_cli.planning import CEILING, clock
 from ir_cli.view.clearance import StationAccess, station_accesses
 from ir_cli.view.playback import PlayedMotion, motion_of
-from ir_description import Cell, DescriptionError
+from ir_description import Cell
 from ir_kernels.errors import KernelError
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement, TrajectoryReport
@@ -152,7 +152,7 @@ class PlanWorker:
                 self._work(asked)
             except CancelledError:
                 continue
-            except (DescriptionError, KernelError, IrError, PlannerError) as error:
+            except (KernelError, IrError, PlannerError) as error:
                 self._post(
                     "planned",
                     self._listener.planned,

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from ir_cli.errors import CommandError
 from ir_cli.station_access import MARGIN
 from ir_cli.view.background import QUIET, Inbox, Listener, Planned, PlanWorker, ViewRequest
-from ir_cli.view.cell_file import CommandError, Recorded, Watched, save
+from ir_cli.view.cell_file import Recorded, Watched, save
 from ir_cli.view.clearance import Nearest, NearestPairs, StationAccess, names_in
 from ir_cli.view.moves import (
     DragTarget,

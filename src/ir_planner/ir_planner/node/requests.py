@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ir_description import DescriptionError, UnknownNameError, cell_to_yaml, is_path, robot_urdf
+from ir_description import UnknownNameError, cell_to_yaml, is_path, robot_urdf
 from ir_kernels import KernelError
 from ir_msgs.srv import (
     CheckState,
@@ -91,7 +91,7 @@ def known_status(error: Exception) -> Status | None:  # noqa: PLR0911
         return Status(error.code, str(error))
     if isinstance(error, UnknownNameError):
         return Status(StatusCode.INVALID_OBJECT_NAME, str(error))
-    if isinstance(error, (DescriptionError, IrError)):
+    if isinstance(error, IrError):
         return Status(StatusCode.INVALID_GOAL_CONSTRAINTS, str(error))
     if isinstance(error, (PlannerError, KernelError)):
         return Status(StatusCode.FAILURE, str(error))

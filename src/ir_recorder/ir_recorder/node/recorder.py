@@ -18,7 +18,7 @@ from ir_msgs.srv import StartRecording, StopRecording
 from ir_msgs_py import names
 from ir_msgs_py.checks import one_line
 from ir_msgs_py.ros.diagnostics import ERROR, OK, WARN, Condition, Diagnostics
-from ir_msgs_py.ros.node_process import InvalidValueError, own_words, run_node
+from ir_msgs_py.ros.node_process import own_words, run_node
 from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.ros.serving import BoundedService, answered
 from ir_msgs_py.status import Status, StatusCode
@@ -46,7 +46,7 @@ from ir_recorder.recording.settings import RecorderSettings
 from ir_recorder.recording.topics import TopicSelection, checked_topics, single_type
 from ir_recorder.recording.worker import Act, Message, RecordingWorker
 from ir_recorder.recording.writer import OpenWriter, RecordingSummary, RecordingWriter, open_writer
-from ir_values.errors import IrError
+from ir_values.errors import InvalidValueError, IrError
 from ir_values.files import FileRoots
 
 # Answers to ~/start and ~/stop: a refusal is a status, and no request ends the node.

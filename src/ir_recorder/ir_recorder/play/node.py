@@ -30,7 +30,7 @@ from ir_msgs.srv import ControlPlayback
 from ir_msgs_py import names
 from ir_msgs_py.names import own
 from ir_msgs_py.ros.messages import interface_type
-from ir_msgs_py.ros.node_process import InvalidValueError, own_words, run_node
+from ir_msgs_py.ros.node_process import own_words, run_node
 from ir_msgs_py.ros.serving import BoundedService, answered
 from ir_msgs_py.status import Status, StatusCode
 from ir_recorder.arguments import play_parser, roots_of
@@ -338,7 +338,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         settings = PlaySettings(options.rate, options.loop, tuple(options.topics))
         delay = checked_delay(options.delay)
         recording = read_raw(options.file, roots_of(options.roots))
-    except (InvalidValueError, RecorderError, IrError) as error:
+    except (RecorderError, IrError) as error:
         sys.stderr.write(f"ir-play: {error}\n")
         return 1
     for problem in recording.problems:

@@ -20,7 +20,6 @@ from rclpy.time_source import USE_SIM_TIME_NAME
 from std_msgs.msg import Float64
 from visualization_msgs.msg import MarkerArray
 
-from ir_description import DescriptionError
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, StartPause
 from ir_msgs_py import names
@@ -85,7 +84,7 @@ _LINES_MAX = 20  # of the log per second: who toggles a bit all day must not fil
 _RESULT_KEPT = 60  # s that the result of a goal can be asked for; each takes memory
 _GRAPH_PERIOD = 0.2  # s between two looks who is there: each takes a millisecond
 _LAST_WORDS = 1.0  # s for the answers to goals when the plant has stopped
-REFUSALS = (DriverError, DescriptionError, IrError)
+REFUSALS = (DriverError, IrError)
 _LOOK = 1.0  # s between two looks whether the plant runs: each delays its thread
 _SWITCH_INTERVAL = 0.0005  # s; the plant's thread must not wait 5 ms for another thread's Python
 

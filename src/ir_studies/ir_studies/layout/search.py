@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from ir_description import Cell, DescriptionError, cell_from_yaml
+from ir_description import Cell, cell_from_yaml
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner import PlannerError, PlannerSettings, ProgramPlan, RequestError
@@ -231,7 +231,7 @@ class Maker:
             return self._plan(words)
         except RequestError as error:
             return refused(error.status)
-        except (PlannerError, IrError, DescriptionError) as error:
+        except (PlannerError, IrError) as error:
             return {"solved": False, "kind": "beyond limits", "message": str(error)}
 
     def _look(self, values: Mapping[str, float], payloads: list[Mapping[str, float]]) -> Row:
