@@ -52,6 +52,7 @@ _HALVINGS = 16
 _LOOKED_AT = 48  # postures at once
 _TRIED = 500  # postures in which capsules overlap, but by no more than usual
 _GAP = 1e-3  # m: within which what a pair keeps is found
+_ENOUGH = 0.8  # of the postures that the exact distance would leave
 _POSTURES_MAX = 20_000  # looked at to find it
 _NEAREST = 5e-4  # m: surfaces that are nearer count as meeting
 _ROUGHLY = 2e-3  # m: the same where rings are counted
@@ -515,7 +516,7 @@ class _Meeting:
 
         Boxes of postures are halved until in none of those left the capsules can be farther apart
         than found, or nothing can meet: how far anything moves within a box is bounded. What is
-        left after very many counts as if it met.
+        left counts as if it met once that takes few postures, or after very many boxes.
         """
         self._left = _BOXES
         found = max(usual - _GAP, self._seen(distance, usual))
@@ -538,6 +539,9 @@ class _Meeting:
             open_ &= apart + moved > found + _GAP
             if not open_.any():
                 return min(found + _GAP, 0.0)
+            bound = min(float(np.max(apart[open_] + moved)), 0.0)
+            if (distance > bound).mean() >= _ENOUGH * (distance > found).mean():
+                return bound
             longest = int(np.argmax(half * self._reach))
             step = np.zeros(len(half))
             step[longest] = 0.5 * half[longest]
