@@ -186,3 +186,6 @@ def test_a_cells_program_that_begins_in_a_posture_is_todays_that_starts_there(
     for program in (stops, (ProgramStep("POSTURE", "home"), *stops)):
         asked = asked_program(today, replace(scene, cell=replace(scene.cell, program=program)))
         assert "parts and signals at the stops are those of the cell's own program" in asked.notes
+    elsewhere = replace(today, start=today.start + 0.1)  # as a log that begins anywhere
+    asked = asked_program(elsewhere, replace(scene, cell=replace(scene.cell, program=program)))
+    assert "parts and signals at the stops are those of the cell's own program" not in asked.notes

@@ -171,7 +171,7 @@ def _handled(steps: list[StepToday], cell: Cell, start: str) -> tuple[list[StepT
     program that only begins in the posture `start` begins where today's does.
     """
     program_steps = [step for step in cell.program if step.kind != "PAUSE"]
-    if program_steps and program_steps[0] == ProgramStep("POSTURE", start):
+    if program_steps and start and program_steps[0] == ProgramStep("POSTURE", start):
         program_steps = program_steps[1:]
     stopping = [step.step for step in steps if step.step.kind != "PAUSE"]
     if not program_steps or [s.target for s in program_steps] != [s.target for s in stopping]:

@@ -252,7 +252,7 @@ def chosen(
     if TIME not in places and math.isnan(mapping.step):
         raise RecorderError(
             f"{where}: there is no column time, {_known(headings)}; a mapping gives the step "
-            "between rows of a file without it: time: {step: 4, unit: ms}"
+            "between rows of a file without it: columns: {time: {step: 4, unit: ms}}"
         )
     return places
 
