@@ -256,8 +256,13 @@ def _of_a_cycle(savings: ProgramSavings | None, count: float) -> ProgramSavings 
         Saving(*(value / count for value in astuple(part)))
         for part in (savings.movements, savings.pauses)
     )
-    ends = {"total_low": savings.total_low / count, "total_high": savings.total_high / count}
-    return replace(savings, movements=movements, pauses=pauses, **ends)
+    return replace(
+        savings,
+        movements=movements,
+        pauses=pauses,
+        total_low=savings.total_low / count,
+        total_high=savings.total_high / count,
+    )
 
 
 def _cycles_of_program(recording: Recording) -> int:
