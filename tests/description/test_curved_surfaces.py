@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from ir_cli.main import main
 from ir_description.files import curved_surfaces
 from ir_description.files.convex_pieces import point_triangle
 from ir_description.files.curved_surfaces import triangles_of_surfaces
@@ -186,3 +187,14 @@ def test_without_cascadio_the_sentence_names_it(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(curved_surfaces, "find_spec", lambda name: None)
     with pytest.raises(InvalidValueError, match="pip install"):
         triangles_of_surfaces(b"", ".step")
+
+
+def test_an_import_says_that_the_triangles_of_curved_surfaces_are_not_proved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("cascadio")
+    monkeypatch.setenv("IR_CACHE", str(tmp_path))
+    (tmp_path / "drum.step").write_text(cylinder_step("inch"))
+    assert main(["cell", "import", str(tmp_path / "drum.step")]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[-1] == f"# {curved_surfaces.NOT_PROVED}"

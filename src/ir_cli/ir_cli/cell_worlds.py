@@ -26,6 +26,7 @@ from ir_description import (
 from ir_description.cell import shape_register, zone_around
 from ir_description.files import point_cloud
 from ir_description.files.curved_surfaces import KINDS as SURFACES
+from ir_description.files.curved_surfaces import NOT_PROVED
 from ir_description.files.solid_mesh import PIECES, PIECES_MAX, UNITS, SolidReader
 from ir_description.files.worlds import IMPORTERS, WRITERS, read_world
 from ir_description.library import robot_named
@@ -234,13 +235,20 @@ def run_import(arguments: argparse.Namespace) -> int:
     pieces = "" if arguments.pieces == PIECES else f", pieces: {arguments.pieces}"
     unit = f", unit: {arguments.unit}" if arguments.unit else ""
     line = f"- {{name: {name}, mesh: {path.name}{unit}{pieces}}}"
+    rests_on = [NOT_PROVED] if path.suffix.lower() in SURFACES else []
     if arguments.json:
         measures = {"margin": found.margin, "protrusion": found.protrusion, "volume": found.volume}
         print_json(
-            {"line": line, "pieces": len(found.vertices), **measures, "of_pieces": found.of_pieces}
+            {
+                "line": line,
+                "pieces": len(found.vertices),
+                **measures,
+                "of_pieces": found.of_pieces,
+                "not_proved": rests_on,
+            }
         )
     else:
-        sys.stdout.write(f"{line}\n# {found.sentence}\n")
+        sys.stdout.write("\n# ".join([line, found.sentence, *rests_on]) + "\n")
     return 0
 
 

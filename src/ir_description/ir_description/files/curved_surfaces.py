@@ -23,6 +23,12 @@ from ir_values.errors import InvalidValueError, one_line
 
 KINDS = {".step": "step", ".stp": "step", ".iges": "iges", ".igs": "iges"}
 """What OpenCASCADE calls the files of each ending."""
+
+NOT_PROVED = (
+    "its curved surfaces are taken as triangles that OpenCASCADE lays within what the pieces are "
+    "widened by, which is not proved: for a proof export STL"
+)
+"""What certificates rest on where such a file is part of a cell."""
 ERRORS = (0.002, 0.008, 0.032)
 """m of the triangles from the surfaces, which OpenCASCADE is believed; the first with which there
 are not too many is taken.
