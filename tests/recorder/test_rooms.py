@@ -30,18 +30,6 @@ KNOWS = {
     "node": {"arguments", "errors", "format", "recording"},
     "__init__": READING | {"analysis"},
 }
-FACE = {
-    *(
-        "Analysis",
-        "Finding",
-        "RecorderError",
-        "ReadError",
-        "RecorderError",
-        "Recording",
-        "SchemaError",
-    ),
-    *("Tolerances", "Verdict", "WriteError", "analyse", "findings", "read_recording", "summary"),
-}
 ROOMS = [path.parent.name for path in sorted(FOLDER.glob("*/__init__.py"))]
 
 
@@ -80,8 +68,3 @@ def test_a_room_has_a_first_line_and_shows_what_may_be_used(room: str) -> None:
     assert module.__doc__
     assert module.__all__ == sorted(module.__all__)
     assert all(hasattr(module, name) for name in module.__all__)
-
-
-def test_the_public_face_is_this_list() -> None:
-    assert set(ir_recorder.__all__) == FACE
-    assert all(hasattr(ir_recorder, name) for name in FACE)
