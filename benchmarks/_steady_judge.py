@@ -159,7 +159,9 @@ def _least_of_order(
         right.append(most)
     fixed = sum(mode.joules for mode in chosen)
     answer = linprog(cost, A_ub=np.array(rows), b_ub=right, bounds=bounds, method="highs")
-    return float(answer.fun) + fixed if answer.status == 0 else np.inf
+    if answer.status != 0 or answer.fun is None:
+        return np.inf
+    return float(answer.fun) + fixed
 
 
 def _whole(n: int, size: int) -> np.ndarray:
