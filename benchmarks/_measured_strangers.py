@@ -50,33 +50,42 @@ class Stranger:
     standing: float  # W
 
 
-def stranger(seed: int) -> Stranger:
-    """A robot of a payload between 4 and 200 kg."""
+def stranger(seed: int, far: float = 1.0) -> Stranger:
+    """A robot of a payload between 4 and 200 kg; far: times the usual deviation from what is
+    known.
+    """
     rng = np.random.default_rng(seed)
     payload = float(np.exp(rng.uniform(np.log(4.0), np.log(200.0))))
-    return standing_for(_built(payload, rng), payload, rng)
+    return standing_for(_built(payload, rng), payload, rng, far)
 
 
-def standing_for(known: RobotModel, payload: float, rng: np.random.Generator) -> Stranger:
-    """A robot of which `known` is known, for a payload [kg], with figures of its own."""
+def standing_for(
+    known: RobotModel, payload: float, rng: np.random.Generator, far: float = 1.0
+) -> Stranger:
+    """A robot of which `known` is known, for a payload [kg], with figures of its own; far: times
+    the usual deviation.
+    """
     n = known.n
-    spread = rng.lognormal
+
+    def spread(deviation: float) -> FloatArray:
+        return rng.lognormal(0.0, far * deviation, n)
+
     peak = known.envelope_torque[:, 0]
     swing = 0.5 * known.reflected_inertia * known.velocity_max**2
     return Stranger(
         known=known,
         carries=payload,
-        masses=spread(0.0, 0.15, n),
-        centres=rng.normal(0.0, 0.02 * payload**0.2, (n, 3)),
-        payload=rng.uniform(0.0, 0.3) * payload,
-        viscous=known.friction_viscous * spread(0.0, 0.6, n),
-        coulomb=known.friction_coulomb * spread(0.0, 0.5, n),
+        masses=spread(0.15),
+        centres=rng.normal(0.0, far * 0.02 * payload**0.2, (n, 3)),
+        payload=far * rng.uniform(0.0, 0.3) * payload,
+        viscous=known.friction_viscous * spread(0.6),
+        coulomb=known.friction_coulomb * spread(0.5),
         stick=rng.uniform(0.05, 0.3, n),
         warm=rng.uniform(0.0, 0.2),
-        rotors=spread(0.0, 0.2, n),
-        copper=known.copper_loss * spread(0.0, 0.3, n),
+        rotors=spread(0.2),
+        copper=known.copper_loss * spread(0.3),
         switching=rng.uniform(0.3, 2.5, n),
-        iron=0.004 * peak / known.velocity_max * spread(0.0, 0.4, n),
+        iron=0.004 * peak / known.velocity_max * spread(0.4),
         gears=(rng.uniform(0.0, 0.04), rng.uniform(0.0, 0.06)),
         capacity=float(swing[:3].max() * rng.uniform(0.2, 1.5)),
         lower=rng.uniform(0.7, 0.95),
