@@ -1,4 +1,4 @@
-"""A listener that gets no processor for seconds finds every joint state when it is back."""
+"""A listener that gets no processor for a while finds every joint state when it is back."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ from ir_msgs_py.ros.testing import PATIENCE
 from ir_sim_driver.node import SimDriver
 
 COUNT = 1_500
-STARVED = 2.0  # s of real time
-# s: a busy machine may leave it stopped for longer, and who is not heard for 5 s is forgotten
-LONGEST = 3.0
+PERIOD = 2_000_000  # ns between two joint states
+STARVED = 400  # joint states at least: a busy machine makes some hundred more before it is seen
+# s: a busy machine may leave it stopped for longer, and who is not heard for 10 s is forgotten
+LONGEST = 8.0
 MOST = 1_800  # joint states that it may miss meanwhile: 2,000 are kept for it
 TRIES = 20
 LISTENER = """
@@ -54,7 +55,7 @@ def stamp_of(msg):
 
 
 def starve(listener, published, wait_for):
-    """What the listener says after two seconds without a processor; "" where it was too long
+    """What the listener says after a while without a processor; "" where it was too long
     without.
     """
     with listener:
@@ -63,11 +64,12 @@ def starve(listener, published, wait_for):
             assert listener.stdout.readline() == "hears\n"
             listener.send_signal(signal.SIGSTOP)
             begin = time.monotonic()
-            before = published[-1]
-            wait_for(lambda: time.monotonic() - begin >= STARVED)
+            before = len(published)
+            wait_for(
+                lambda: len(published) - before >= STARVED or time.monotonic() - begin > LONGEST
+            )
             listener.send_signal(signal.SIGCONT)
-            missed = sum(stamp > before for stamp in list(published))
-            assert missed > 0
+            missed = len(published) - before
             if time.monotonic() - begin > LONGEST or missed > MOST:
                 return ""
             said = listener.stdout.readline()
@@ -77,7 +79,7 @@ def starve(listener, published, wait_for):
             listener.kill()
 
 
-def test_two_seconds_without_a_processor_lose_nothing(
+def test_who_gets_no_processor_for_a_while_loses_nothing(
     ros_context, ros_executor, ros_node, ros_domain_id, monkeypatch, wait_for
 ):
     monkeypatch.setenv("ROS_DOMAIN_ID", str(ros_domain_id))
@@ -100,5 +102,4 @@ def test_two_seconds_without_a_processor_lose_nothing(
     tries = (subprocess.Popen(words, stdout=subprocess.PIPE, text=True) for _ in range(TRIES))
     said = next(filter(None, (starve(listener, published, wait_for) for listener in tries)))
     first, last, count = map(int, said.split())
-    wait_for(lambda: published[-1] >= last, what="what the listener has heard")
-    assert count == sum(first <= stamp <= last for stamp in published)
+    assert last - first == (count - 1) * PERIOD
