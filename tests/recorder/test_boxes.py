@@ -217,6 +217,32 @@ def test_nothing_is_cut_overlaps_or_scrolls_and_axe_finds_nothing(
     assert {size: found for size, found in faults.items() if found} == {}
 
 
+@pytest.mark.parametrize("name", ["report", "before and after"])
+def test_paper_from_a_phone_has_every_section_that_paper_from_a_desk_has(
+    browser: Any, analysis: Analysis, tmp_path: Path, name: str
+) -> None:
+    path = tmp_path / "page.html"
+    path.write_text(PAGES[name](analysis), encoding="utf-8")
+    shown = """[...document.querySelectorAll("main h2")].filter((each) => {
+        const part = each.closest("section, details");
+        return each.getClientRects().length && (part.tagName !== "DETAILS" || part.open);
+    }).map((each) => each.textContent)"""
+    read = {}
+    printed = {}
+    for size in ("desk", "phone"):
+        page = browser.open(path, *SIZES[size], touch=size == "phone")
+        read[size] = page.run(shown)
+        page.call("Emulation.setEmulatedMedia", media="print")
+        page.size(*SIZES["paper"])
+        page.run("dispatchEvent(new Event('beforeprint'))")
+        page.frame()
+        printed[size] = page.run(shown)
+        page.run("dispatchEvent(new Event('afterprint'))")
+        page.close()
+    assert len(read["phone"]) < len(read["desk"])  # the phone folds
+    assert set(printed["desk"]) == set(printed["phone"])
+
+
 def page_pictures() -> ModuleType:
     """The tool that draws pages; the fixture of the browser has loaded the module that it needs."""
     path = ROOT / "tools" / "page_pictures.py"

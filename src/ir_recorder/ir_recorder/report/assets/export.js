@@ -127,14 +127,14 @@ function exportButtons() {
   }
 }
 
-/* On a telephone: what comes after the answer opens when its heading is chosen; curves and pictures stay. */
+/* On a telephone: what comes after the answer opens when its heading is chosen; curves and pictures stay. Paper has what a desk has. */
 function foldOnPhones(kept) {
   if (!matchMedia("(max-width: 700px)").matches) return;
   for (const section of document.querySelectorAll("main > section[id]")) {
     const head = section.querySelector(":scope > h2");
     if (!head || kept.includes(section.id) || section.querySelector("canvas")) continue;
     const part = document.createElement("details"), summary = document.createElement("summary");
-    part.className = "part";
+    part.className = "part paper";
     part.id = section.id;
     summary.append(head);
     part.append(summary, ...section.childNodes);
