@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import os
-import random
 import re
-import signal
 import subprocess
 import sys
-import time
-from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
 from ir_msgs_py.ros.network import CHOICES, apply_network, network_variables, profile
-from ir_msgs_py.ros.testing import PATIENCE, WaitFor
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_values.errors import InvalidValueError
 
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
@@ -43,92 +38,6 @@ def test_what_a_full_receiver_dropped_is_sent_again_soon(name: str) -> None:
     period = re.search(r"<heartbeatPeriod>\s*<sec>0</sec>\s*<nanosec>(\d+)", text)
     assert period is not None
     assert int(period[1]) <= 50_000_000
-
-
-STARVED = """
-import sys, time
-from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
-from std_msgs.msg import Int64
-from ir_msgs_py.ros.node_process import run_node
-
-OWN = int(sys.argv[1])
-KEPT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-
-class Counter(Node):
-    def __init__(self):
-        super().__init__(f"counter_{OWN}")
-        self.last = {}
-        self.numbers = self.create_publisher(Int64, f"/numbers_{OWN}", KEPT)
-        for other in {0, 1, 2} - {OWN}:
-            self.create_subscription(
-                Int64, f"/numbers_{other}", lambda msg, of=other: self.hear(of, msg.data), KEPT
-            )
-        self.create_timer(0.1, self.count)
-        self.own = 0
-
-    def hear(self, of, number):
-        assert number == self.last.get(of, 0) + 1, "a kept message was lost"
-        self.last[of] = number
-
-    def count(self):
-        self.own += 1
-        self.numbers.publish(Int64(data=self.own))
-        print(self.own, *(self.last.get(of, 0) for of in sorted({0, 1, 2} - {OWN})), flush=True)
-
-run_node("counter", Counter, sys.argv[:1])
-"""
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("seed", range(4))
-def test_nodes_that_got_no_processor_for_seconds_hear_each_other_again(
-    seed: int, tmp_path: Path, ros_domain_id: int, wait_for: WaitFor
-) -> None:
-    """As on a busy machine, from their start on."""
-    environment = {**os.environ, RANGE: "LOCALHOST"}
-    drawn = random.Random(seed)
-    with ExitStack() as ends:
-        nodes = []
-        for k in range(3):
-            log = ends.enter_context((tmp_path / f"{k}.log").open("w"))
-            command = [sys.executable, "-c", STARVED, str(k)]
-            nodes.append(subprocess.Popen(command, stdout=log, env=environment))
-            ends.callback(nodes[-1].kill)
-            time.sleep(drawn.uniform(0.0, 2.0))
-        end = time.monotonic() + 40.0
-        runs = [True] * 3
-        due = [0.0] * 3
-        while time.monotonic() < end:
-            for k, node in enumerate(nodes):
-                if time.monotonic() < due[k]:
-                    continue
-                runs[k] = not runs[k]
-                node.send_signal(signal.SIGCONT if runs[k] else signal.SIGSTOP)
-                starved = drawn.choice([0.3, 1.2, 3.0, 7.0]) * drawn.uniform(0.5, 1.0)
-                due[k] = time.monotonic() + (drawn.uniform(0.005, 0.3) if runs[k] else starved)
-            time.sleep(0.005)
-        for node in nodes:
-            node.send_signal(signal.SIGCONT)
-
-        def counts(k: int) -> list[int]:
-            """The last complete line of counts: others are of the middleware's log."""
-            lines = (tmp_path / f"{k}.log").read_text().split("\n")[:-1]
-            counted = [line for line in lines if re.fullmatch(r"[\d ]+", line)]
-            return [int(word) for word in counted[-1].split()] if counted else []
-
-        wait_for(lambda: all(counts(k) for k in range(3)), what="all nodes have started")
-        begun = [counts(k)[0] for k in range(3)]
-        for k in range(3):
-            others = [begun[other] for other in range(3) if other != k]
-            wait_for(
-                lambda k=k, others=others: all(
-                    heard > number for heard, number in zip(counts(k)[1:], others, strict=True)
-                ),
-                timeout=120.0,
-                what=f"node {k} hears the others",
-            )
-        assert [node.poll() for node in nodes] == [None] * 3
 
 
 def test_no_discovery_at_all_stays_none() -> None:

@@ -19,8 +19,8 @@ from ir_sim_driver.node import SimDriver
 COUNT = 1_500
 PERIOD = 2_000_000  # ns between two joint states
 STARVED = 400  # joint states at least: a busy machine makes some hundred more before it is seen
-# s: a busy machine may leave it stopped for longer, and who is not heard for 10 s is forgotten
-LONGEST = 8.0
+# s: a busy machine may leave it stopped for longer, and who is not heard for 5 s is forgotten
+LONGEST = 4.0
 MOST = 1_800  # joint states that it may miss meanwhile: 2,000 are kept for it
 TRIES = 20
 LISTENER = """

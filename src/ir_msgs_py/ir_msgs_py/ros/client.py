@@ -140,7 +140,7 @@ def _chosen(types: Sequence[str]) -> str:
 
 GONE = 10.0
 """s without anybody who offers an action before its goal is given up. The middleware forgets a
-process that died, or was stopped, after another 10 s.
+process that died, or was stopped, after 5 s.
 """
 
 
