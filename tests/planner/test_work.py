@@ -13,7 +13,7 @@ from ir_msgs_py.options import PlanOptions
 from ir_planner.checks import FreeSpace
 from ir_planner.program.movements import mapped
 from ir_planner.regional import search_regional
-from ir_planner.regional.safeguards import LATE, Found, with_own_laws
+from ir_planner.regional.safeguards import LATE, with_own_laws
 from ir_planner.request.context import Context, Journal, Work
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.search import SEARCHES, Ends
@@ -67,19 +67,15 @@ def test_an_asynchronous_request_whose_time_is_over_keeps_its_synchronous_answer
     scene = scene_of("open")
     task = scene.cell.task("home->p1")
     context = Context(scene, PlanOptions(timing="asynchronous"), Journal(work, 0))
-    answers: list[Found] = []
-
-    def synchronous() -> Found:
-        asked = context.with_timing("synchronous")
-        answers.append(search_regional(np.array(task.start), np.array(task.goal), asked, SEARCHES))
-        now[0] = 2.0 if late else 0.0
-        return answers[0]
-
-    found = with_own_laws(context, synchronous)
+    asked = context.with_timing("synchronous")
+    status, answer = search_regional(np.array(task.start), np.array(task.goal), asked, SEARCHES)
+    assert status.ok
+    assert answer is not None
+    now[0] = 2.0 if late else 0.0
+    found = with_own_laws(answer, context)
     notes = [stage.note for stage in context.journal.stages if stage.name == "asynchronous"]
     assert (notes == [LATE]) == late
     assert work.truncated == late
-    assert found[0].ok
     if late:
-        assert found[1] is answers[0][1]
+        assert found is answer
         assert context.journal.timing == "synchronous"
