@@ -87,13 +87,13 @@ def recomputed(finished: FinishedStatistics, folder: Path) -> list[Claim]:
     rows = sorted((row for row in rows if "key" in row), key=lambda row: int(row["key"]))
     own = [row for row in rows if both(row) and row["asynchronous"]["timing"] == "asynchronous"]
     off = [
-        largest(each, [percent(row["asynchronous"][name], row["synchronous"][name]) for row in own])
+        largest(each, [[(row["asynchronous"][name], row["synchronous"][name])] for row in own])
         for each, name in zip(finished.findings.comparisons, COLUMNS, strict=True)
         if name is not None
     ]
     for each, name in zip(finished.findings.agreements, ("predicted_j", "indirect_j"), strict=True):
-        by_pair = [[percent(one[name], one["direct_j"]) for one in movements(row)] for row in rows]
-        off.append(largest(each, [fmean(values) for values in by_pair if values]))
+        by_pair = [[(one[name], one["direct_j"]) for one in movements(row)] for row in rows]
+        off.append(largest(each, [sides for sides in by_pair if sides]))
     return [at_most("statistics: page against figures computed from its rows", max(off), "%", 1e-6)]
 
 
@@ -117,13 +117,21 @@ def percent(first: float, second: float) -> float:
     return 100.0 * (first - second) / second
 
 
-def largest(each: Comparison, values: Sequence[float]) -> float:
+def largest(each: Comparison, pairs: Sequence[Sequence[tuple[float, float]]]) -> float:
     """The largest difference [%] of a comparison's mean, interval and median from those of the
-    values.
+    movements of pairs, each with both of its figures.
     """
+    values = [fmean(percent(*sides) for sides in own) for own in pairs]
+    first, second = ([fmean(sides[k] for sides in own) for own in pairs] for k in (0, 1))
+    ratio = sum(first) / sum(second)
+    scale = 100.0 / fmean(second)
+    linear = [
+        100.0 * (ratio - 1.0) + scale * (a - ratio * b) for a, b in zip(first, second, strict=True)
+    ]
     if len(values) < 2 or max(values) - min(values) < 1e-6:
         return 0.0
-    expected = (fmean(values), *ends(values, t_quantile(0.95, len(values) - 1)), median(values))
+    mean = 100.0 * (ratio - 1.0)
+    expected = (mean, *ends(linear, t_quantile(0.95, len(values) - 1)), median(values))
     found = (each.mean.value, each.mean.low, each.mean.high, each.median.value)
     return max(abs(a - b) for a, b in zip(found, expected, strict=True))
 

@@ -37,6 +37,7 @@ from ir_recorder.report.costs import (
     payback,
     read_costs,
     recorded_idle_saving,
+    together,
     yearly_money,
     yearly_span,
 )
@@ -309,8 +310,17 @@ def test_a_fleet_counts_the_same_robots_in_shifts_and_at_night(analysis: Analysi
     shifts = costs.money(total.common * costs.cycles_per_year(total.seconds))
     shifts += costs.money(costs.energy_of_year(bare.cycle).value)
     picture = page.split('<section id="year">')[1].partition("</section>")[0]
-    assert f"<b>{yearly_money(shifts + 2.0 * idle.left_alone, 'EUR')}</b>" in picture
-    assert "1 of them without a plan&#x27;s saving, as recorded" in picture
+    nights = 2.0 * idle.left_alone
+    assert f"<b>{yearly_money(together((shifts, nights)), 'EUR')}</b>" in picture
+    assert "second alike in all: no file says what its plan saves" in picture
+    driven = picture.partition("these files, as driven")[2]
+    assert f"{yearly_money(nights, 'EUR')} outside" in driven  # nobody recorded a night
+    share = 100.0 * total.saved / total.common  # of the program that a plan is held against
+    assert f"<small>{share:.1f} % " in page
+    assert "less than common programs of the robots that have a plan" in page
+    assert "of it from nights, by the data sheet" in page
+    assert "Go on driving the plan of first instead of its common program" in page
+    assert "the other 576 h a year of the shifts count nowhere" in page
     measures = page.split("<h2>What to change first")[1].partition("</section>")[0]
     assert "at night and at weekends<small>hibernation" in measures
     assert yearly_money(2.0 * idle.saved, "EUR") in measures
@@ -346,17 +356,20 @@ def test_hibernation_outside_of_the_shifts_is_a_headline(analysis: Analysis) -> 
     energy = year.value + found.energy.value
     assert found.energy.value == pytest.approx(power * costs.idle_hours * 3600.0)
     headline = f"{both}, {kilowatt_hours(energy)}, {kilograms(costs.co2(energy))} CO2 less a year"
-    for page in (report_html(analysis, (), costs=costs), fleet_html([member], costs=costs)):
+    for page, words in (
+        (report_html(analysis, (), costs=costs), f"{both} less a year"),
+        (fleet_html([member], costs=costs), f"{both} a year less than common programs"),
+    ):
         answer = page.split('<section id="answer">')[1]
-        assert f"<b>{both} less a year</b>" in answer
+        assert f"<b>{words}</b>" in answer
         assert headline.partition(", ")[2].removesuffix(" a year") in answer
     assert "less energy of the whole line" not in rows[0]
     assert "from the data sheet, not measured" in rows[0]
     assert cycle.savings is not None
     total = cycle.savings.total
     common = total.common * costs.cycles_per_year(total.seconds or cycle.seconds)
-    today = costs.money(common) + found.left_alone
-    then = today - costs.money(year.value) - found.saved
+    today = together((costs.money(common), found.left_alone))
+    then = together((costs.money(common - year.value), found.deepest))
     picture = report_html(analysis, (), costs=costs).split('<section id="year">')[1]
     for value in (today, then):
         assert f"<b>{yearly_money(value, 'EUR')}</b>" in picture.partition("</section>")[0]

@@ -104,7 +104,7 @@ def test_the_command_sums_folders_up_and_names_what_it_leaves_out(
     said = capsys.readouterr().err
     assert "bad.mcap: left out" in said
     assert "empty.mcap: left out" in said
-    assert "2 robots, 2 recordings" in page.read_text(encoding="utf-8")
+    assert "2 robots: 2 simulated runs" in page.read_text(encoding="utf-8")
     with table.open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["what"] == "cycle"]
     assert [row["robot"] for row in rows] == ["left", "right"]

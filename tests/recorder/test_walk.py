@@ -105,16 +105,16 @@ def quantities(analysis: Analysis, cycle: Production, costs: Costs) -> dict[str,
     price = costs.production_price / 3.6e6
     found = {
         "a year of such cycles": cycle.energy * year * price,
-        "costs a year": cycle.energy * year * price,
-        "robot: costs a year": cycle.energy * year * price,
+        "costs in shifts a year": cycle.energy * year * price,
+        "robot: costs in shifts a year": cycle.energy * year * price,
         f"{cycle.name}: a year": cycle.energy * year * price,
         f"{cycle.name}: a shift": cycle.energy * cycles * price,
         f"{cycle.name}: a cycle": cycle.energy,
         "a cycle: robot": cycle.energy,
         "robot: energy a part": cycle.energy / costs.parts_per_cycle,
         "energy a year": cycle.energy * year,
-        "robot: energy a year": cycle.energy * year,
-        "all: energy a year": cycle.energy * year,
+        "robot: energy in shifts a year": cycle.energy * year,
+        "all: energy in shifts a year": cycle.energy * year,
         "robot: cycle": cycle.seconds,
         "robot: largest quarter of an hour": demand_watts(analysis, cycle),
         "peak power": analysis.peak_power,
@@ -165,7 +165,7 @@ def test_figures_of_one_name_are_one_value_on_every_page(walked: Analysis, seed:
             if figure.name in exact and figure.kind != "%":
                 seen.add(figure.name)
                 assert figure.shows(exact[figure.name]), (name, figure, exact[figure.name])
-    assert {"a year of such cycles", "robot: costs a year", "a cycle: robot"} <= seen
+    assert {"a year of such cycles", "robot: costs in shifts a year", "a cycle: robot"} <= seen
     once = [figure for figures in shown.values() for figure in figures if _once(figure, figures)]
     for figure in once:
         alike = [each for each in READ.called(once, figure.name) if each.kind == figure.kind]
@@ -208,8 +208,8 @@ def test_robots_and_months_of_a_fleet_are_sums_of_their_recordings(walked: Analy
     ]
     found = READ.figures_of(fleet_html(fleet, costs=costs))
     year = costs.energy_of_year(cycle).value
-    (one,) = [f for f in READ.called(found, "first: energy a year") if f.kind == "J"]
-    (both,) = [f for f in READ.called(found, "all: energy a year") if f.kind == "J"]
+    (one,) = [f for f in READ.called(found, "first: energy in shifts a year") if f.kind == "J"]
+    (both,) = [f for f in READ.called(found, "all: energy in shifts a year") if f.kind == "J"]
     assert one.shows(year)
     assert both.shows(2.0 * year)
     for month in ("2026-01", "2026-02", "2026-03"):

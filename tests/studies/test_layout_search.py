@@ -114,7 +114,9 @@ def test_what_is_left_behind(laid: Laid, tmp_path: Path) -> None:
     assert "https://" not in page
     assert "{{" not in page
     answer = page.partition('id="answer"')[2].partition("</section>")[0]
-    assert " EUR less a year</b>" in answer or "No placement is shown to save" in answer
+    assert "<b>Not worth moving: " in answer or "No placement is shown to save" in answer
+    assert "planned with one seed" in answer or "between 2 seeds" in answer
+    assert '<p class="verdict open">Leave as it stands</p>' in page
     assert "Leave everything where it stands" in answer or "Plan best_1.yaml" in answer
     assert "90 % interval" in answer
     assert (

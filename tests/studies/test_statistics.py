@@ -102,8 +102,13 @@ def test_two_movements_of_a_pair_count_as_one_where_energies_are_compared() -> N
         for x in share.tolist()
     ]
     agreed = findings_of(rows).agreements[0]
-    by_pair = mean_of(100.0 * (1.0 / (1.0 + share) - 1.0))
+    direct = 1.0 + share
+    ratio = 1.0 / direct.mean()  # of the sums: they are what a year is made of
+    by_pair = mean_of(100.0 * (ratio - 1.0 + (1.0 - ratio * direct) / direct.mean()))
     assert agreed.count == 80
+    assert agreed.mean.value == pytest.approx(100.0 * (ratio - 1.0), abs=1e-9)
+    first, second = agreed.levels
+    assert agreed.mean.value == pytest.approx(100.0 * (first / second - 1.0), abs=1e-9)
     assert (agreed.mean.low, agreed.mean.high) == pytest.approx(
         (by_pair.low, by_pair.high), abs=1e-9
     )

@@ -92,7 +92,7 @@ def test_figures_that_differ_by_rounding_are_alike() -> None:
 @pytest.mark.parametrize(
     ("shares", "words"),
     [
-        ((0.0, 0.05, 0.1), "<b>Predicted energies are 7.2 % too low</b>"),
+        ((0.0, 0.05, 0.1), "<b>Predicted energies are 7.3 % too low</b>"),
         ((-0.5, -0.4), "% too high, which may be chance."),
         ((), ""),
     ],
@@ -105,8 +105,9 @@ def test_the_page_says_first_how_far_the_prediction_is_off(
     assert words in answer
     assert bool(answer) == bool(shares)
     if shares:
-        assert f"of {2 * len(shares)} measured ones lie in the predicted 90 % interval." in answer
+        assert f"of {2 * len(shares)} measured ones lie in the predicted 90 % interval" in answer
         assert page.index(answer) < page.index('class="tile"')
+        assert "runs from the prediction upwards" in answer
 
 
 def test_what_lies_beyond_the_axis_is_an_arrow_at_its_end() -> None:
@@ -224,3 +225,11 @@ def test_settings_stand_as_a_table_without_the_empty_ones() -> None:
     for name, value in ASKED.budget.items():
         assert (f"<code>{name}</code>" in shown) == (value not in ("", (), {}))
     assert ">0.02<" in shown
+
+
+def test_what_is_off_is_no_green_badge_and_pairs_without_a_plan_are_said() -> None:
+    shares = np.random.default_rng(4).normal(0.05, 0.02, 20).tolist()
+    lost = {timing: {"solved": False, "message": "no path"} for timing in SIDES}
+    page = page_html(findings_of([*pairs(*shares), lost]), ASKED)
+    assert '<p class="verdict open">7.3 % too low</p>' in page
+    assert "1 of 21 pairs could not be planned." in page

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeGuard
@@ -404,6 +404,17 @@ def yearly_money(value: float, currency: str) -> str:
     return f"{value:.2f} {currency}" if abs(value) < 1.0 else money(value, currency)
 
 
+def together(amounts: Sequence[float]) -> float:
+    """The sum of amounts of a year as they are shown, each rounded: it adds up on the page."""
+    return sum(_rounded(each) for each in amounts)
+
+
+def _rounded(value: float) -> float:
+    if not math.isfinite(value):
+        return value
+    return round(value, 0 if abs(value) >= _NO_CENTS else 2)
+
+
 def yearly_span(low: float, high: float) -> str:
     """The ends of an amount of a year, without its currency."""
     return _span_of_money(low, high, _NOTHING)
@@ -486,10 +497,13 @@ def counted_with(costs: Costs) -> str:
     """
     own = set(NAMES) & set(costs.given)
     origin = "as your file gives it" if own == set(NAMES) else "partly assumed"
+    hours = significant(costs.production_hours * (1.0 - costs.availability), 3)
+    between = "" if hours == "0" else f" (the other {hours} h a year of the shifts count nowhere)"
     words = (
         f"Counted with {_setting(costs, 'price')}, {costs.shifts_per_day:g} shifts of "
         f"{costs.shift_hours:g} h on {costs.days_per_year:g} days a year, "
-        f"{100.0 * costs.availability:g} % of them in cycles, {origin if own else 'all assumed'}"
+        f"{100.0 * costs.availability:g} % of them in cycles{between}, "
+        f"{origin if own else 'all assumed'}"
     )
     rounded = "Each amount is rounded by itself, so sums may differ by one in the last digit."
     return f'{text(words)}: <a href="#assumed">all values, and how to give yours</a>. {rounded}'

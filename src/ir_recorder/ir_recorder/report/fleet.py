@@ -14,6 +14,7 @@ from pathlib import Path
 from ir_recorder.analysis import Analysis, analyse
 from ir_recorder.analysis.production import (
     DRIVES_ONLY,
+    PREDICTED,
     Amount,
     Production,
     demand_watts,
@@ -420,10 +421,10 @@ def fleet_html(
     year = paid.picture(prices)
     shown = [tile for tile in _tiles(paid, known, robots, prices) if tile is not None]
     return shell(
-        f"{counted(len(robots), 'robot')}, {counted(len(members), 'recording')}",
+        f"{counted(len(robots), 'robot')}: {_origins(members)}",
         "a year of each robot, one cycle after the other",
         f"{first}{year}{row_of(shown) if shown else ''}{''.join(sections)}",
-        badges=[f'<p class="source open">{text(_origins(members))}</p>', _badge(paid)],
+        badges=[_badge(paid, prices)],
     )
 
 
@@ -438,7 +439,7 @@ def _answer(paid: Paid, robots: Sequence[Robot], costs: Costs) -> Answer:
     if paid.saved is None and paid.idle is None:
         return Answer(
             f"{yearly_money(price.value, costs.currency)} a year",
-            f"for the energy of {counted(len(summed), 'robot')} in shifts, as recorded: {taken}.",
+            f"for the energy of {counted(len(summed), 'robot')} in shifts: {taken}.",
             _sure(price, costs),
             "Plan their programs (ir plan CELL --saving -o plan.mcap) and name these files as "
             "well: no recording says what a plan saves.",
@@ -446,7 +447,8 @@ def _answer(paid: Paid, robots: Sequence[Robot], costs: Costs) -> Answer:
     year = paid.year(costs)
     word, gain = year.money.gain()
     less = "less" if word == "saved" else "more"
-    result = f"{yearly_money(gain.value, costs.currency)} {less} a year"
+    than = paid.before if paid.saved is not None else "closed brakes at night"
+    result = f"{yearly_money(gain.value, costs.currency)} a year {less} than {than}"
     if paid.saved is not None and paid.saved.doubt:
         result = f"Open whether anything is saved: {result}"
     saved = year.with_energy(costs)
@@ -468,36 +470,57 @@ def _steps(paid: Paid, robots: Sequence[Robot], costs: Costs) -> list[str]:
         words = f"Let them go into {paid.idle.mode} at night and at weekends: {price} a year."
         found.append((paid.idle.saved, words))
     if paid.saved is not None and paid.saved.value > 0.0 and not paid.saved.doubt:
-        best = max(robots, key=lambda robot: robot.saved.value if robot.saved is not None else 0.0)
         saved = costs.money(paid.saved.value)
-        price = yearly_money(saved, costs.currency)
-        found.append((saved, f"Drive the plans, that of {best.name} first: {price} a year."))
+        words = f"{_plans(robots)}: {yearly_money(saved, costs.currency)} a year."
+        found.append((saved, words))
     return [words for _, words in sorted(found, reverse=True)] or ["Keep the programs as they are."]
 
 
-def _badge(paid: Paid) -> str:
+def _plans(robots: Sequence[Robot]) -> str:
+    """Whose plans to drive: those of robots that save, the one that saves most first; keep on where
+    all were driven already.
+    """
+    known = [robot for robot in robots if not robot.drives_only]
+    gains = {robot: robot.saved.value for robot in known if robot.saved is not None}
+    saving = sorted((robot for robot in gains if gains[robot] > 0.0), key=lambda r: -gains[r])
+    if len(saving) == 1:
+        of = f"the plan of {saving[0].name} instead of its common program"
+    else:
+        of = f"the plans, that of {saving[0].name} first, instead of common programs"
+    driven = all(PREDICTED not in robot.origins for robot in saving)
+    return f"Go on driving {of}, as recorded" if driven else f"Drive {of}"
+
+
+def _badge(paid: Paid, costs: Costs) -> str:
     if paid.saved is None:
         return badge("No plan's saving known", "open")
     if paid.saved.doubt:
         return badge("Open whether plans save", "open")
     if paid.saved.value < 0.0:
         return badge("The plans take more", "bad")
+    if paid.idle is not None and not paid.idle.measured:
+        nights = paid.idle.saved / (paid.idle.saved + costs.money(paid.saved.value))
+        if nights > _MUCH:
+            return badge(f"{100.0 * nights:.0f} % of it from nights, by the data sheet", "open")
     return badge("The plans save", "good")
+
+
+_MUCH = 0.5  # of what is saved: what isn't measured then is said beside the title
 
 
 def _tiles(
     paid: Paid, members: Sequence[Member], robots: Sequence[Robot], costs: Costs
 ) -> list[Tile | None]:
-    """A year of the fleet as recorded, what is saved of it, and its largest quarter of an hour."""
+    """A year of the fleet in shifts, what is saved, and its largest quarter of an hour."""
     summed = [robot for robot in robots if not robot.drives_only]
     if not summed:
         return []
     yearly = sum_of([robot.yearly for robot in summed])
     price = yearly.of(costs.money)
-    of = f"{counted(len(summed), 'robot')}, in shifts, as recorded"
+    of = f"{counted(len(summed), 'robot')}, {_as_made(members)}"
     energy = f"{kilowatt_hours(yearly.value)}, {kilograms(costs.co2(yearly.value))} of CO2"
     costs_tile = Tile(
-        "costs a year",
+        "costs in shifts a year",
         yearly_money(price.value, costs.currency),
         (_sure(price, costs).rstrip("."), energy, of),
     )
@@ -505,9 +528,26 @@ def _tiles(
     demand = Tile(
         "largest quarter of an hour",
         watts(peak),
-        ("mean power, as if all robots' largest came at once", demand_money(peak, costs)),
+        (
+            "in shifts, pauses in their power modes; as if all robots' largest came at once",
+            _outside(paid.idle, peak),
+            demand_money(peak, costs),
+        ),
     )
     return [costs_tile, *paid.parts(costs), demand]
+
+
+def _outside(idle: IdleSaving | None, peak: float) -> str:
+    """That rest takes more than the largest quarter of an hour of the shifts, where it does."""
+    if idle is None or idle.watts_left_alone <= peak:
+        return ""
+    return f"outside, on closed brakes, it is {watts(idle.watts_left_alone)}"
+
+
+def _as_made(members: Sequence[Member]) -> str:
+    """What the energies of a fleet are: of runs that were driven, of plans, or of both."""
+    planned = [member.cycle.origin == PREDICTED for member in members]
+    return "as planned" if all(planned) else "as driven or planned" if any(planned) else "as driven"
 
 
 def _demand(members: Sequence[Member], robot: Robot) -> float:
@@ -521,18 +561,26 @@ def _paid(members: Sequence[Member], costs: Costs) -> Paid:
     robots = robots_of(members, costs)
     if saved is None:
         return Paid(None, 0.0, idle, robots=len(robots))
-    without = [robot.yearly.value for robot in robots if robot.saved is None]
+    without = [robot for robot in robots if robot.saved is None]
     of = f", {counted(len(robots), 'robot')}"
     if without:
-        of += f", {len(without)} of them without a plan's saving, as recorded"
-    recorded = ("as recorded", sum_of([robot.yearly for robot in robots]).value)
-    before = "common programs"
-    before_them = common + sum(without)
-    return Paid(saved, before_them, idle, of, before, recorded, robots=len(robots))
+        of += f", {_names(without)} alike in all: no file says what its plan saves"
+    unplanned = sum(robot.yearly.value for robot in without)
+    recorded = (f"these files, {_as_made(members)}", sum_of([r.yearly for r in robots]).value)
+    return Paid(
+        saved,
+        common + unplanned,
+        idle,
+        of,
+        "common programs",
+        recorded,
+        robots=len(robots),
+        unplanned=unplanned,
+    )
 
 
 _ROBOT_HEADS = (
-    "robot", ">costs a year", ">energy a year", ">saved a year, predicted",
+    "robot", ">costs in shifts a year", ">energy in shifts a year", ">saved a year, predicted",
     ">saved a year at night", ">a part", "change first",
 )  # fmt: skip
 
@@ -549,14 +597,16 @@ def _robots(members: Sequence[Member], robots: Sequence[Robot], costs: Costs) ->
         rows.append((name, *_sums(others, members, costs), DASH, DASH))
     summed = [robot for robot in robots if not robot.drives_only]
     if len(summed) > 1:
-        recordings = counted(sum(robot.recordings for robot in summed), "recording")
+        recordings = counted(sum(robot.recordings for robot in summed), "file")
         name = f"<b>all</b><small>{recordings}</small>"
         rows.append((name, *_sums(summed, members, costs), DASH, DASH))
     hint = (
         "A year is one cycle after the other in shifts, pauses at full length. Common programs: "
         "the same stations by PTP at full speed, the controller's own timers. Small: 90 % "
-        "intervals, which add up as if all were wrong alike. Open: zero lies in the interval."
+        "intervals, which add up as if all were wrong alike."
     )
+    if any(robot.saved is not None and robot.saved.doubt for robot in robots):
+        hint += " Open: zero lies in the interval."
     hint = f"{text(hint)} {counted_with(costs)} {_apart(robots)}"
     return f'{table(_ROBOT_HEADS, rows, "Robots")}<p class="hint">{hint}</p>'
 
@@ -574,9 +624,7 @@ def _robot_row(robot: Robot, members: Sequence[Member], costs: Costs) -> tuple[s
     own = _own(members, robot)
     idle = None if robot.drives_only else _idle_saving(own, costs)
     part = robot.joules / costs.parts_per_cycle
-    made = ", ".join(robot.origins)
-    if robot.recordings > 1:
-        made += f", {counted(robot.recordings, 'recording')}"
+    made = _origins(own)
     return (
         f"{text(robot.name)}<small>{text(robot.cell)}</small><small>{text(made)}</small>"
         + (f"<small>{DRIVES_ONLY}</small>" if robot.drives_only else ""),
@@ -620,16 +668,18 @@ _NAMED = 5  # robots in a sentence
 
 def _apart(robots: Sequence[Robot]) -> str:
     """Which robots are in no sum, and why; "" where all are."""
-    apart = [robot.name for robot in robots if robot.drives_only]
+    apart = [robot for robot in robots if robot.drives_only]
     if not apart:
         return ""
-    names = ", ".join(apart[:_NAMED])
-    if len(apart) > _NAMED:
-        names += f" and {len(apart) - _NAMED} more"
     return text(
         f"In no sum, as their energy at the mains isn't known ({DRIVES_ONLY}), nor what they take "
-        f"at rest: {names}."
+        f"at rest: {_names(apart)}."
     )
+
+
+def _names(robots: Sequence[Robot]) -> str:
+    names = ", ".join(robot.name for robot in robots[:_NAMED])
+    return f"{names} and {len(robots) - _NAMED} more" if len(robots) > _NAMED else names
 
 
 def _around_the_clock(members: Sequence[Member], robots: Sequence[Robot], costs: Costs) -> str:
@@ -711,12 +761,19 @@ def _months(members: Sequence[Member]) -> str:
             )
         )
     heads = ("month", ">driven", ">predicted", ">difference")
+    shortened = any(_shortened(member) for member in known)
+    pauses = "pauses shortened, " if shortened else ""
+    single = "; small: of single recordings" if len(known) > len(kinds) else ""
     hint = (
-        "Runs as they were driven, waiting between steps included, which no plan contains; small: "
-        "of single recordings. A difference that grows is a robot, a tool or a program that has "
-        "changed."
+        f"Runs as they were driven: {pauses}waiting between steps included, which no plan contains"
+        f"{single}. A difference that grows is a robot, a tool or a program that has changed."
     )
     return f'{table(heads, rows, "Month by month", COMPACT)}<p class="hint">{hint}</p>'
+
+
+def _shortened(member: Member) -> bool:
+    """Whether a cycle counts more than what was driven: pauses at full length."""
+    return member.cycle.energy * member.cycle.cycles > 1.001 * member.driven
 
 
 def _clock_row(
@@ -810,7 +867,7 @@ def _potential(members: Sequence[Member], robots: Sequence[Robot], costs: Costs)
     most = max(found[0][0], 1e-9)
     rows = [
         (
-            f"{name}<small>most at {text(max(own, key=lambda robot: own[robot]))}</small>",
+            f"{name}{_most_at(own)}",
             f"<b>{text(yearly_money(price, costs.currency))}</b>"
             f"<small>{text(yearly_kilowatt_hours(sum(own.values())))}</small>",
             bar(price, most, "planned"),
@@ -824,6 +881,17 @@ def _potential(members: Sequence[Member], robots: Sequence[Robot], costs: Costs)
     if little:
         hint += f" Less than {100.0 * _LITTLE:g} % of the largest: {', '.join(little)}."
     return f'{table(heads, rows, "What to change first", COMPACT)}<p class="hint">{hint}</p>'
+
+
+_MORE = 1.05  # times what the next one saves: else none saves most
+
+
+def _most_at(own: Mapping[str, float]) -> str:
+    """The robot at which a measure saves most, in small letters; "" where none stands out."""
+    first, *others = sorted(own.items(), key=lambda each: -each[1])
+    if not others or first[1] < _MORE * others[0][1]:
+        return ""
+    return f"<small>most at {text(first[0])}</small>"
 
 
 def _night(
@@ -850,11 +918,12 @@ def _section(title: str, content: str, name: str = "") -> str:
 
 
 def _origins(members: Sequence[Member]) -> str:
-    counts = {
-        origin: sum(m.cycle.origin == origin for m in members)
-        for origin in dict.fromkeys(m.cycle.origin for m in members)
-    }
-    return ", ".join(f"{count} {origin}" for origin, count in counts.items())
+    """How many runs of which origin, and how many plans."""
+    counts = Counter(member.cycle.origin for member in members)
+    return ", ".join(
+        counted(count, "plan" if origin == PREDICTED else f"{origin} run")
+        for origin, count in counts.items()
+    )
 
 
 def _problems(left_out: Sequence[str]) -> str:

@@ -18,6 +18,7 @@ from ir_recorder.report.costs import (
     money_of_thousand,
     payback,
     saved_year,
+    together,
     yearly_money,
     yearly_span,
 )
@@ -49,7 +50,9 @@ class Paid:
     """What those who pay ask first. saved [J] a year by the plan, of `common` [J]; None where it is
     not known; idle: outside of the shifts. counted: what the year is
     made of, in words; before: what it is held against. driven: what else a year of it is called,
-    and what that takes [J]. supply: what limits the figures. robots: how many save it together.
+    and what that takes [J]: nothing is known of its nights, so they are as before. supply: what
+    limits the figures. robots: how many save it together. unplanned [J]: of `common`, what has no
+    plan, which is alike in all years.
     """
 
     saved: Amount | None
@@ -60,6 +63,7 @@ class Paid:
     driven: tuple[str, float] | None = None
     supply: str = ""
     robots: int = 1
+    unplanned: float = 0.0
 
     def answer(
         self, costs: Costs, steps: Sequence[Step], part: tuple[float, float] | None = None
@@ -70,7 +74,8 @@ class Paid:
         year = self.year(costs)
         word, gain = year.money.gain()
         less = "less" if word == "saved" else "more"
-        today = costs.money(self.common) + (0.0 if self.idle is None else self.idle.left_alone)
+        nights = 0.0 if self.idle is None else self.idle.left_alone
+        today = together((costs.money(self.common), nights))
         energy = year.with_energy(costs)
         share = f"{_percent(gain.value, today)} of {yearly_money(today, costs.currency)}"
         said = (f"{energy} {less}" if energy else "", share, payback(year.money, costs))
@@ -116,9 +121,9 @@ class Paid:
         ]
         if self.driven is not None:
             name, energy = self.driven
-            rows.append(_year_row(name, "driven", (costs.money(energy), nights[1]), costs))
+            rows.append(_year_row(name, "driven", (costs.money(energy), nights[0]), costs))
         pale = " Pale: at night and at weekends." if self.idle is not None else ""
-        whisker = " Whisker: 90 % interval of what is saved." if sure else ""
+        whisker = " Whisker: 90 % interval of the year as planned." if sure else ""
         common = _COMMON if self.before == COMMON else ""
         hint = f"In full colour: in shifts{self.counted}.{pale}{whisker}{common}"
         return (
@@ -135,8 +140,11 @@ class Paid:
             return None
         word, gain = self.saved.gain()
         energy = kilowatt_hours(gain.value)
-        share = with_ends(gain.times(100.0 / self.common)) if self.common > 0.0 else ""
+        held = self.common - self.unplanned
+        share = with_ends(gain.times(100.0 / held)) if held > 0.0 else ""
         less = "less" if word == "saved" else "more"
+        if self.unplanned > 0.0:
+            less += f" than {self.before} of the robots that have a plan"
         notes = (
             _between(gain.of(costs.money), costs),
             f"{share} {less}, {energy}",
@@ -221,7 +229,7 @@ def _year_row(
     if money[1] > 0.0:
         pieces.append(Piece(f"{style} night", f"at night and at weekends {nights}", money[1]))
         parts = f"{shifts} in shifts, {nights} outside"
-    price = yearly_money(sum(money), costs.currency)
+    price = yearly_money(together(money), costs.currency)
     return Row(name, tuple(pieces), price, (parts, between), whisker=whisker)
 
 

@@ -232,9 +232,10 @@ def page_html(
     )
     head = Head(
         f"Layout of {cell.name}",
-        f"{len(known)} placements, {len(settings.variables)} variables; energies are predicted",
-        _answer(known, finals, costs),
-        "Predicted, not driven",
+        f"{len(known)} placements, {len(settings.variables)} variables; energies are predicted, "
+        "nothing was driven",
+        _answer(known, finals, settings, costs),
+        *_verdict(finals, costs),
     )
     parts = {
         "tiles": _tiles(known, finals),
@@ -254,7 +255,10 @@ def page_html(
 
 
 def _answer(
-    known: Sequence[Known], finals: Sequence[Sequence[Final]], costs: Costs
+    known: Sequence[Known],
+    finals: Sequence[Sequence[Final]],
+    settings: LayoutSettings,
+    costs: Costs,
 ) -> Answer | None:
     """Whether moving anything pays, in money of a year, how sure that is, and what to do."""
     given, best = ends(finals)
@@ -271,26 +275,73 @@ def _answer(
     moved = f"{percent(abs(moving)).lstrip('+')} {'less' if moving >= 0.0 else 'more'}"
     words = (
         f"by the best placement: {kilowatt_hours(year.energy.value)} of "
-        f"{kilowatt_hours(like.mean())} a cycle ({share}); the movements alone take {moved}."
+        f"{kilowatt_hours(like.mean())} at the mains a cycle, pauses included ({share}); the "
+        f"movements alone take {moved}."
     )
     ends_of = yearly_span(year.money.low, year.money.high)
     sure = (
-        f"90 % interval {ends_of} {costs.currency}, over robots as the data sheet allows them; "
-        f"{kilowatt_hours(one.spread())} a cycle between seeds. Predicted, not driven."
+        f"90 % interval {ends_of} {costs.currency}, over robots as the data sheet allows them"
+        f"{_one_sided(year.money)}; {_between_seeds(one)}. {_at_limits(one, settings)}"
+        "Predicted, not driven."
     )
     if year.money.value <= 0.0 or year.money.low <= 0.0:
         result = "No placement is shown to save"
         return Answer(result, "", sure, "Leave everything where it stands.")
-    result = f"{yearly_money(year.money.value, costs.currency)} less a year"
+    price = yearly_money(year.money.value, costs.currency)
     if year.money.value < costs.engineer_hour:
         hour = f"{costs.engineer_hour:g} {costs.currency}"
         do = f"Leave everything where it stands: less than one hour of an engineer ({hour})."
-        return Answer(result, words, sure, do)
+        return Answer(f"Not worth moving: {price} a year at best", words, sure, do)
+    result = f"{price} less a year"
     do = (
         f"Move: that {payback(year.money, costs)}. Plan best_1.yaml, and look at cables, ways of "
         "people and how parts come, which no study knows."
     )
     return Answer(result, words, sure, do)
+
+
+def _verdict(finals: Sequence[Sequence[Final]], costs: Costs) -> tuple[str, bool]:
+    """The badge: whether to move anything."""
+    given, best = ends(finals)
+    if given is None or best is None:
+        return "Predicted, not driven", False
+    year = _year(best[0], of_condition(given, best[0]), costs)
+    if year.money.low <= 0.0 or year.money.value < costs.engineer_hour:
+        return "Leave as it stands", False
+    return "Moving pays, predicted", True
+
+
+def _one_sided(money: Amount) -> str:
+    """That an interval begins at its value, where it does; "" where it doesn't."""
+    if money.low < money.value:
+        return ""
+    return ": it begins at the value itself, as none of the likely robots saves less"
+
+
+def _between_seeds(one: Final) -> str:
+    """How far the seeds of a plan lie apart."""
+    seeds = len(one.rows)
+    if seeds == 1:
+        return "planned with one seed"
+    return f"{kilowatt_hours(one.spread())} a cycle between {seeds} seeds"
+
+
+_EDGE = 0.03  # of its range: a variable that near to an end stands at the edge of what was searched
+
+
+def _at_limits(one: Final, settings: LayoutSettings) -> str:
+    """Which variables of a placement stand at the edge of their range; "" where none does."""
+    found = []
+    for variable in settings.variables:
+        value = one.placement.values.get(variable.name, 0.0)
+        near = _EDGE * (variable.high - variable.low)
+        inside = variable.low + near < value < variable.high - near
+        if not inside and value != 0.0:
+            owner = variable.owner.removeprefix(_MACHINE)
+            found.append(f"{owner} {variable.part.removesuffix('_deg')}")
+    if not found:
+        return ""
+    return f"The search ended at its edge ({', '.join(found)}): wider ranges may give more. "
 
 
 @dataclass(frozen=True)
@@ -316,10 +367,11 @@ def _beside(finals: Sequence[Sequence[Final]], settings: LayoutSettings) -> str:
     if given is None or all(settings.cycle_times):
         return ""
     cycle = kilowatt_hours(given[0].mean())
+    cost_of = kilowatt_hours(given[0].mean("cost_j"))
     return (
         '<p class="hint">That is of the movements alone, without pauses and without what the '
-        f"controller takes. The {text(cycle)} of a cycle as given are all energy at the mains, "
-        "pauses included.</p>"
+        f"controller takes: of {text(cost_of)} as given. The {text(cycle)} of a cycle as given "
+        "are all energy at the mains, pauses included.</p>"
     )
 
 
@@ -371,7 +423,13 @@ def _tiles(known: Sequence[Known], finals: Sequence[Sequence[Final]]) -> str:
     """A cycle of the best beside that of the given placement, under the first condition."""
     given, best = ends(finals)
     impossible = sum(one.cost == math.inf for one in known)
-    looked = Tile("placements looked at", str(len(known)), (f"{impossible} of them impossible",))
+    planned = sum(math.isfinite(one.cost) for one in known)
+    rest = len(known) - planned - impossible
+    looked = Tile(
+        "placements planned",
+        f"{planned} of {len(known)}",
+        (f"{impossible} impossible", f"{rest} only estimated" if rest else ""),
+    )
     if given is None or best is None:
         return row_of([looked])
     one = best[0]
@@ -381,16 +439,16 @@ def _tiles(known: Sequence[Known], finals: Sequence[Sequence[Final]]) -> str:
     return row_of(
         [
             Tile(
-                "energy of a cycle by the best",
+                "energy of a cycle at the mains, pauses included",
                 kilowatt_hours(one.mean()),
                 (
-                    _against(like.mean() - one.mean(), kilowatt_hours),
+                    f"best placement: {_against(like.mean() - one.mean(), kilowatt_hours)}",
                     f"90 % interval {span_of(within.low, within.high, kilowatt_hours)}",
                     one.condition.text if several else "",
                 ),
             ),
             Tile(
-                "its movements alone",
+                "its movements alone, at the mains",
                 kilowatt_hours(one.mean("moving_j")),
                 (_against(like.mean("moving_j") - one.mean("moving_j"), kilowatt_hours),),
             ),

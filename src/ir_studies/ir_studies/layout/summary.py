@@ -224,9 +224,13 @@ def against(best: Final, given: Final) -> str:
     sure = "" if low > 0.0 else "; zero lies in it: it is open whether anything is saved"
     moving = 1.0 - best.mean("moving_j") / given.mean("moving_j")
     change = f"{percent(abs(moving)).lstrip('+')} {'less' if moving >= 0.0 else 'more'}"
-    took = seconds(given.mean("duration_s"))
-    takes = seconds(best.mean("duration_s"))
-    pace = "as long as before" if takes == took else f"{takes} instead of {took}"
+    faster = given.mean("duration_s") - best.mean("duration_s")
+    by = seconds(abs(faster))
+    pace = (
+        "as long as before"
+        if by == seconds(0.0)
+        else f"{by} {'less' if faster > 0.0 else 'more'} than before"
+    )
     return (
         f"the given one {kilowatt_hours(given.mean())}. It {does} {kilowatt_hours(sign * less)}, "
         f"{percent(sign * less / given.mean()).lstrip('+')} (90 % interval {between}{sure}); the "

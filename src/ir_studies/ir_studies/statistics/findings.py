@@ -106,12 +106,13 @@ unit.
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Relative differences in percent: values of each pair, or of each movement where pairs have
-    several; what follows is taken over `pairs`, which are independent: the mean with its 90 %
-    interval, the median with that by order statistics, effect (mean over standard deviation:
+    """Differences in percent: values of each pair, or of each movement where pairs have several;
+    what follows is taken over `pairs`, which are independent: mean, the difference of all firsts
+    together in percent of all seconds (ratio of sums), with its 90 % interval by linearisation; the
+    median of the pairs' values with that by order statistics, effect (mean over standard deviation:
     Cohen's d of paired samples), chance of such a mean. spread: standard deviation of the values.
     skewed: few carry the mean.
-    levels: means of the first and of the second, in `unit`.
+    levels: means of the first and of the second, in `unit`; their ratio is the mean's.
     shown: a difference is shown, all comparisons of the table taken together.
     """
 
@@ -156,7 +157,8 @@ class Findings:
     drawn again; slower: of the others, those whose asynchronous movement takes longer.
     comparisons: asynchronous against synchronous of the others, by natural value. agreements:
     predicted and indirect against direct, over all movements; covered: share of the movements whose
-    directly measured energy lies in the predicted interval. driven: movements that were measured.
+    directly measured energy lies in the predicted interval; upwards: share of those whose interval
+    begins at the prediction itself. driven: movements that were measured.
     failures: why pairs have no comparison and movements no measurement, each with how many.
     """
 
@@ -169,6 +171,7 @@ class Findings:
     agreements: tuple[Comparison, ...]
     covered: float
     driven: int
+    upwards: float
     failures: tuple[PairFailure, ...] = ()
 
 
@@ -206,6 +209,7 @@ def findings_of(rows: Sequence[Row]) -> Findings:
         ),
         _covered(driven),
         len(driven),
+        _upwards(driven),
         failures_of(rows),
     )
 
@@ -223,7 +227,7 @@ def compared(
     second: Callable[[Row], float],
     own_pair: Sequence[int] | None = None,
 ) -> Comparison:
-    """first / second - 1 in percent over the rows that have both.
+    """first against second in percent over the rows that have both.
 
     own_pair: the pair of each row where a pair has several; its movements go between the same
     places, so that what is said of the mean and the median is taken over pairs. Where all are alike
@@ -233,13 +237,16 @@ def compared(
     kept = np.isfinite(figures).all(axis=1) & (figures[:, 1] != 0.0)
     values = 100.0 * (figures[kept, 0] / figures[kept, 1] - 1.0)
     values[np.abs(values) < ALIKE] = 0.0
-    levels = tuple(figures[kept].mean(axis=0).tolist()) if kept.any() else (math.nan, math.nan)
     by_pair = values
+    sides = figures[kept]
     if own_pair is not None:
         of = np.asarray(own_pair, dtype=int)[kept]
-        by_pair = np.array([values[of == pair].mean() for pair in dict.fromkeys(of.tolist())])
-    mean = mean_of(by_pair)
-    deviation = math.nan if alike(by_pair) else spread_of(by_pair)
+        own = [of == pair for pair in dict.fromkeys(of.tolist())]
+        by_pair = np.array([values[each].mean() for each in own])
+        sides = np.array([sides[each].mean(axis=0) for each in own]).reshape(-1, 2)
+    of_sums = _of_sums(sides)
+    mean = mean_of(of_sums)
+    deviation = math.nan if alike(of_sums) else spread_of(of_sums)
     return Comparison(
         name,
         values,
@@ -248,10 +255,24 @@ def compared(
         median_of(by_pair),
         spread_of(values),
         mean.value / deviation,
-        chance_of(by_pair),
-        skewed(by_pair),
-        levels,
+        chance_of(of_sums),
+        skewed(of_sums),
+        tuple(sides.mean(axis=0).tolist()) if len(sides) else (math.nan, math.nan),
     )
+
+
+def _of_sums(sides: FloatArray) -> FloatArray:
+    """What each pair (N,) says of the difference of the sums of both sides (N, 2), in percent: its
+    mean is that difference, its spread that of a ratio of sums to first order (Cochran, Sampling
+    Techniques (1977), 6.4).
+    """
+    if not len(sides):
+        return np.empty(0)
+    first, second = sides.T
+    ratio = first.sum() / second.sum()
+    found = 100.0 * (ratio - 1.0 + (first - ratio * second) / second.mean())
+    found[np.abs(found) < ALIKE] = 0.0
+    return np.asarray(found)
 
 
 def _movements(row: Row, k: int) -> tuple[object, ...]:
@@ -279,3 +300,10 @@ def _covered(driven: Sequence[Row]) -> float:
         for one in driven
     ]
     return float(np.mean(inside))
+
+
+def _upwards(driven: Sequence[Row]) -> float:
+    if not driven:
+        return math.nan
+    lowest = [number(one, "predicted_low_j") >= number(one, "predicted_j") for one in driven]
+    return float(np.mean(lowest))

@@ -130,7 +130,14 @@ _NUMBERS = (
     "peak_w", "path_m", "movement_cost", "torque_share",
 )  # fmt: skip
 _TEXTS = ("timing", "trajectory_id", "message")
-_HEADS = ("", ">pairs", ">mean difference, 90 %", ">median, 90 %", ">less / equal / more", ">d")
+_HEADS = (
+    "",
+    ">pairs",
+    ">difference of the sums, 90 %",
+    ">median of the pairs, 90 %",
+    ">less / equal / more",
+    ">d",
+)
 _SUMMED_UP = (
     "comparison", "pairs", "values", "mean_percent", "low_percent", "high_percent", "median_percent",  # noqa: E501
     "median_low_percent", "median_high_percent", "effect", "less", "more", "chance", "shown",
@@ -304,13 +311,17 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
         "predicted": text(_predicted(found)[0] or "No energy was measured"),
         "notes": "".join(f"<li>{text(note)}</li>" for note in notes(found, settings)),
         "comparisons": _table(
-            found.comparisons, "Asynchronous against synchronous", (">asynchronous", ">synchronous")
+            found.comparisons,
+            "Asynchronous against synchronous",
+            (">asynchronous, mean", ">synchronous, mean"),
         ),
         "left_out": folded(_left_out(found)),
         "comparison_dots": dots(
             found.comparisons, "asynchronous less synchronous, in percent of synchronous"
         ),
-        "agreements": _table(found.agreements, "Energies of a movement", (">energy", ">direct")),
+        "agreements": _table(
+            found.agreements, "Energies of a movement", (">energy, mean", ">direct, mean")
+        ),
         "agreement_dots": dots(
             found.agreements, "predicted or indirect less direct, in percent of direct"
         ),
@@ -331,12 +342,14 @@ def _answer(found: Findings) -> Answer | None:
     sure = f"Over {counted(each.pairs, 'pair')} of places. {_SCOPE}"
     if math.isfinite(each.mean.low):
         sure = f"90 % interval {_interval(each.mean)} %. {sure}"
+    if found.solved < found.pairs:
+        sure += f" {found.pairs - found.solved} of {found.pairs} pairs could not be planned."
     advice = []
     if each.outside:
         factor = 1.0 / (1.0 + 0.01 * each.mean.value)
         advice.append(
-            f"Multiply predicted energies of such a robot by {factor:.3f}, or fit its power "
-            "parameters to a meter (ir energy fit)."
+            "Fit the power parameters of your robot to a meter (ir energy fit) before you trust "
+            f"sums; for this simulated one a factor of {factor:.3f} would do."
         )
     if not any(one.shown for one in found.comparisons):
         advice.append("Take either timing: neither is shown to be better.")
@@ -344,12 +357,20 @@ def _answer(found: Findings) -> Answer | None:
 
 
 def _verdict(found: Findings) -> tuple[str, bool]:
-    """The badge: how many of the measured energies lie where they were predicted."""
+    """The badge: how far predicted energies are off, else how many of the measured ones lie where
+    they were predicted.
+    """
     if not found.driven or not math.isfinite(found.covered):
         return "", False
+    each = _against_direct(found)
+    if each is not None and each.outside:
+        return _off(each), False
     inside = round(found.covered * found.driven)
     words = f"{inside} of {found.driven} energies in the predicted interval"
     return words, found.covered >= LEVEL
+
+
+_MOSTLY = 0.5  # of the intervals
 
 
 def _timings(found: Findings) -> str:
@@ -358,7 +379,7 @@ def _timings(found: Findings) -> str:
     if not shown:
         return "No change by asynchronous joints is shown"
     said = [f"{each.name} {percent(each.mean.value)} % ({_interval(each.mean)})" for each in shown]
-    return f"Asynchronous joints change {', '.join(said)} in the mean"
+    return f"Asynchronous joints change {', '.join(said)} in sum"
 
 
 def _against_direct(found: Findings) -> Comparison | None:
@@ -375,20 +396,37 @@ def _predicted(found: Findings) -> tuple[str, str]:
     if each is None:
         return "", ""
     low = each.mean.value < 0.0
-    side = "low" if low else "high"
-    result = f"Predicted energies are {significant(abs(each.mean.value), 2)} % too {side}"
+    result = f"Predicted energies are {_off(each)}"
     words = (
-        f"In the mean; too {side} in {each.less if low else each.more} of {each.count} movements."
+        f"Their sum; {'too low' if low else 'too high'} in {each.less if low else each.more} of "
+        f"{each.count} movements."
     )
     if abs(each.mean.value) < ALIKE:
-        result, words = "Predicted energies are right", "In the mean."
+        result, words = "Predicted energies are right", "Their sum."
     elif math.isfinite(each.mean.low) and not each.outside:
-        words = f"In the mean: {result.lower()}, which may be chance."
+        words = f"Their sum: {result.lower()}, which may be chance."
         result = "Predicted energies are not shown to be off"
     if math.isfinite(found.covered):
         inside = round(found.covered * found.driven)
-        words += f" {inside} of {found.driven} measured ones lie in the predicted 90 % interval."
+        words += f" {inside} of {found.driven} measured ones lie in the predicted 90 % interval"
+        words += f"{_one_sided(found)}."
     return result, words
+
+
+def _off(each: Comparison) -> str:
+    """How far a mean is off, and in which direction."""
+    side = "low" if each.mean.value < 0.0 else "high"
+    return f"{significant(abs(each.mean.value), 2)} % too {side}"
+
+
+def _one_sided(found: Findings) -> str:
+    """That intervals begin at the prediction, where most do; "" where they don't."""
+    if found.upwards <= _MOSTLY:
+        return ""
+    return (
+        f", which of {round(found.upwards * found.driven)} runs from the prediction upwards: what "
+        "robots may take more, by their data sheet"
+    )
 
 
 def _tiles(found: Findings) -> list[Tile]:
