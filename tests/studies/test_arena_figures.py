@@ -156,7 +156,7 @@ def test_the_page_says_first_who_won_and_what_that_means() -> None:
     answer = page.split('<section id="answer">')[1].partition("</section>")[0]
     assert "<b>Nobody is shown to win</b>" in answer
     assert "portfolio solved most, 1 of 1 runs" in answer
-    assert "No difference is shown to sbl" in answer
+    assert "No difference of 0.1 % is shown to sbl" in answer
     assert "in joules: energy of the drives + each robot's own price [W] x seconds" in page
     assert " J above" not in page
     assert "no planner need be named" in page
@@ -172,10 +172,32 @@ def test_a_winner_is_named_with_whom_it_is_shown_to_beat() -> None:
     cost = {"portfolio": 100.0, "sbl": 100.0, "rrt": math.nan}
     runs = [run(name, str(k), cost[name], 0.1, 0.5) for name in planners for k in range(10)]
     page = page_html(runs, settings)
-    assert "<b>portfolio wins against 1 of 2</b>" in page
+    assert "<b>Keep the default (portfolio)</b>" in page
+    assert "1 of the 2 others are shown to differ: rrt." in page
     assert "rrt<small>solves fewer</small>" in page
     alone = [one for one in runs if one.entry.planner != "sbl"]
-    assert "<b>portfolio wins</b>" in page_html(alone, replace(settings, planners=planners[::2]))
+    assert "others are shown" in page_html(alone, replace(settings, planners=planners[::2]))
+    other = [one for one in runs if one.entry.planner != "portfolio"]
+    assert "<b>sbl wins</b>" in page_html(other, replace(settings, planners=planners[1:]))
+
+
+def test_an_arena_that_is_not_finished_compares_what_all_were_asked() -> None:
+    """A planner that was asked one more solved most, by a count of other movements."""
+    settings = ArenaSettings(cells=("open", "cnc_door"), planners=("portfolio", "sbl", "rrt"))
+    first = {"portfolio": 0.3, "sbl": 0.1, "rrt": 0.2}
+    runs = [
+        run(name, str(k), 100.0, first[name], 0.5) for name in settings.planners for k in range(4)
+    ]
+    runs.append(run("portfolio", "9", 100.0, 0.3, 0.5))
+    page = page_html(runs, settings, missing=7)
+    assert '<p class="verdict open">13 of 20 runs</p>' in page
+    assert "Not finished: 13 of 20 runs, none of cnc_door." in page
+    assert "1 of 2 cells" in page
+    ranking = page.partition('id="ranking"')[2].partition("</section>")[0]
+    assert ranking.count("<b>4</b> of 4") == 3
+    soonest = page.partition("soonest first answer")[2].partition("</div>")[0]
+    assert "<b>sbl</b>" in soonest
+    assert "1 more that not every planner was asked yet" in page
 
 
 def test_free_questions_do_not_hide_where_the_portfolio_is_beaten() -> None:

@@ -283,7 +283,7 @@ def test_the_page_holds_all_and_fetches_nothing(fought: Fought) -> None:
     assert "http://" not in page.replace("http://www.w3.org", "")
     assert "https://" not in page
     assert "{{" not in page
-    assert "3 planners, 1 cell, 1 question, 2 seeds: 6 runs of 0.01 s of processor" in page
+    assert "3 planners, 1 cell, 1 movement, 2 seeds: 6 runs of 0.01 s of processor" in page
     data = json.loads(page.partition('id="data">')[2].partition("</script>")[0])
     assert (
         data["end"] == 0.01

@@ -253,6 +253,18 @@ def blocked_and_free(runs: Sequence[ArenaRun]) -> tuple[list[ArenaRun], list[Are
     return [run for run in runs if not run.free_ptp], [run for run in runs if run.free_ptp]
 
 
+def of_all(runs: Sequence[ArenaRun]) -> list[ArenaRun]:
+    """The runs whose question and seed every planner was asked: of an arena that is not finished,
+    those that compare alike.
+    """
+    planners = {run.entry.planner for run in runs}
+    asked: dict[tuple[Question, int], set[str]] = {}
+    for run in runs:
+        asked.setdefault((run.entry.question, run.entry.seed), set()).add(run.entry.planner)
+    common = [run for run in runs if asked[run.entry.question, run.entry.seed] == planners]
+    return common or list(runs)
+
+
 def of_cell(runs: Iterable[ArenaRun], cell: str) -> list[ArenaRun]:
     """Runs in a cell."""
     return [run for run in runs if run.entry.cell == cell]

@@ -36,6 +36,7 @@ from ir_studies.arena.figures import (
     cost_over_time,
     figures,
     longest,
+    of_all,
     of_cell,
     success_over_time,
 )
@@ -134,23 +135,21 @@ def page_html(runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int = 
     """The page as text. missing: runs that were not made yet."""
     titles = _titles(settings.cells)
     blocked, _ = blocked_and_free(runs)
-    shown = blocked or runs
+    shown = of_all(blocked or runs)
     ranking = _ranked(shown, settings)
     end = min(longest(shown), settings.seconds)  # what comes after these doesn't count
     head = Head(
         "Arena: planners against each other",
         _subtitle(runs, settings, missing),
-        _answer(ranking, runs, settings),
-        *_verdict(ranking, settings),
+        _answer(ranking, runs, settings, missing),
+        *_verdict(ranking, runs, settings, missing),
     )
     parts = {
         "time_value": _second(settings.time_value),
         "tiles": row_of(_tiles(ranking)) if ranking is not None else "",
         "ranking": _ranking_table(ranking) if ranking is not None else "",
         "verdict": verdict(runs, settings),
-        "shown": "Movements whose straight line is free are left out: there nothing is searched."
-        if blocked
-        else "The straight line is free in every movement: nothing was searched.",
+        "shown": _shown(runs, shown),
         "above": f"{_ABOVE:g}",
         "longest": seconds(longest(runs)),
         "cells": "".join(
@@ -226,7 +225,7 @@ def _ranking_table(ranking: _Ranking) -> str:
         own = ranking.found[other.planner]
         rows.append(
             (
-                f"{text(own.planner)}<small>{_differs(other) or 'no difference shown'}</small>",
+                f"{text(own.planner)}<small>{_differs(other) or 'no difference'}</small>",
                 f"<b>{own.solved}</b> of {own.count}",
                 bar(own.success, 1.0, ""),
                 _with_ends(other.cost),
@@ -254,10 +253,40 @@ def _subtitle(runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int) -
     made = (
         f"{len(runs)} runs" if not missing else f"so far {len(runs)} of {len(runs) + missing} runs"
     )
-    counts = {"planner": len(settings.planners), "cell": len(settings.cells)}
-    counts |= {"question": questions, "seed": settings.seeds}
-    asked = ", ".join(f"{count} {word}{'s' if count > 1 else ''}" for word, count in counts.items())
+    without = len(_without(runs, settings))
+    cells = counted(len(settings.cells), "cell")
+    if without:
+        cells = f"{len(settings.cells) - without} of {cells}"
+    asked = ", ".join(
+        (
+            counted(len(settings.planners), "planner"),
+            cells,
+            counted(questions, "movement"),
+            counted(settings.seeds, "seed"),
+        )
+    )
     return f"{asked}: {made} of {settings.seconds:g} s of processor"
+
+
+def _without(runs: Sequence[ArenaRun], settings: ArenaSettings) -> list[str]:
+    """Titles of cells without a run."""
+    return [title for cell, title in _titles(settings.cells).items() if not of_cell(runs, cell)]
+
+
+def _shown(runs: Sequence[ArenaRun], shown: Sequence[ArenaRun]) -> str:
+    """Which movements are compared, and which are not."""
+    movements = len({run.entry.question for run in shown})
+    blocked, free = blocked_and_free(runs)
+    if not blocked:
+        return "The straight line is free in every movement: nothing was searched."
+    said = f"Compared over {counted(movements, 'movement')}."
+    if free:
+        left = len({run.entry.question for run in free})
+        said += f" {left} whose straight line is free are left out: there nothing is searched."
+    later = len({run.entry.question for run in blocked}) - movements
+    if later:
+        said += f" {later} more that not every planner was asked yet."
+    return said
 
 
 def _second(time_value: float) -> str:
@@ -265,8 +294,12 @@ def _second(time_value: float) -> str:
     return "each robot's own price [W]" if time_value == ROBOTS_TIME_VALUE else f"{time_value:g} W"
 
 
-def _answer(ranking: _Ranking | None, runs: Sequence[ArenaRun], settings: ArenaSettings) -> Answer:
-    """Who won, how sure that is, and what it means for the choice of a planner."""
+def _answer(
+    ranking: _Ranking | None, runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int
+) -> Answer:
+    """Who won, how sure that is, and what it means for the choice of a planner. missing: runs that
+    were not made yet.
+    """
     if ranking is None:
         return Answer("Nobody wins", "No planner solved any run.")
     best = ranking.found[ranking.winner]
@@ -274,19 +307,23 @@ def _answer(ranking: _Ranking | None, runs: Sequence[ArenaRun], settings: ArenaS
         f"Of {counted(len(settings.planners), 'planner')} with {settings.seconds:g} s of processor "
         f"for each of {counted(ranking.questions, 'movement')} {best.planner} solved most, "
         f"{best.solved} of {best.count} runs, and of those that solved as many its trajectories "
-        f"cost least, {100.0 * (best.cost_ratio - 1.0):.2f} % above the best known in the median."
+        f"cost least, {100.0 * (best.cost_ratio - 1.0):.2f} % above the best known in the median. "
+        f"Its median movement takes {seconds(best.duration)} and {joules(best.energy)}: 1 % of "
+        f"the energy is {joules(0.01 * best.energy)}."
     )
     return Answer(
         _result(ranking),
         words,
-        _sure(ranking, runs, settings),
+        _sure(ranking, runs, settings, missing),
         _to_do(ranking, runs, settings),
     )
 
 
 def _result(ranking: _Ranking) -> str:
-    """Whom the first one is shown to beat."""
+    """Whether to keep the default, else whom the first one is shown to beat."""
     worse = sum(_differs(other) != "" for other in ranking.others)
+    if worse and ranking.winner == PORTFOLIO:
+        return f"Keep the default ({PORTFOLIO})"
     if not ranking.others or worse == len(ranking.others):
         return f"{ranking.winner} wins"
     if worse:
@@ -294,15 +331,22 @@ def _result(ranking: _Ranking) -> str:
     return "Nobody is shown to win"
 
 
-def _sure(ranking: _Ranking, runs: Sequence[ArenaRun], settings: ArenaSettings) -> str:
+def _sure(
+    ranking: _Ranking, runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int
+) -> str:
     """Which others are shown to be worse, and which are not."""
     if not ranking.others:
         return "There is nobody to compare with."
     alike = [other.planner for other in ranking.others if not _differs(other)]
-    count = len(ranking.others) - len(alike)
-    said = f"{count} of the {len(ranking.others)} others are shown to differ from it, at 90 %."
+    differ = [other.planner for other in ranking.others if _differs(other)]
+    named = f": {', '.join(differ)}" if differ else ""
+    said = f"{len(differ)} of the {len(ranking.others)} others are shown to differ{named}."
+    if missing:
+        without = _without(runs, settings)
+        none = f", none of {', '.join(without)}" if without else ""
+        said = f"Not finished: {len(runs)} of {len(runs) + missing} runs{none}. {said}"
     if alike:
-        said += f" No difference is shown to {', '.join(alike)}."
+        said += f" No difference of {_TIE:.1%} is shown to {', '.join(alike)}.".replace("%", " %")
     if _judged(settings) and not behind(runs, settings):
         said += f" In no cell is anybody shown to be ahead of the {PORTFOLIO}."
     return said
@@ -371,8 +415,12 @@ def _judged(settings: ArenaSettings) -> bool:
     return PORTFOLIO in settings.planners and len(settings.planners) > 1
 
 
-def _verdict(ranking: _Ranking | None, settings: ArenaSettings) -> tuple[str, bool]:
-    """The badge: whether the default wins."""
+def _verdict(
+    ranking: _Ranking | None, runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int
+) -> tuple[str, bool]:
+    """The badge: how many runs were made of all, or, with all of them, whether the default wins."""
+    if missing:
+        return f"{len(runs)} of {len(runs) + missing} runs", False
     if ranking is None or not _judged(settings):
         return "", False
     if ranking.winner == PORTFOLIO:
