@@ -31,6 +31,7 @@ from ir_recorder.report.costs import (
     assumed_section,
     clock_section,
     costs_section,
+    counted_with,
     idle_saving,
     lever_section,
     money,
@@ -138,6 +139,19 @@ def test_prices_by_day_and_night_are_means_over_the_minutes_of_a_day(seed: int) 
     assert costs.idle_hours == pytest.approx(hours / 60.0)
     if hours > 0.0:
         assert costs.idle_price == pytest.approx(paid / hours)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_cycles_stops_and_nights_are_all_hours_of_a_year(seed: int) -> None:
+    """Once 576 of them were neither counted nor named."""
+    draw = np.random.default_rng(seed).uniform
+    costs = Costs(availability=draw(0.3, 0.99), shift_hours=draw(4.0, 12.0))
+    pace = draw(10.0, 4000.0)
+    in_cycles = costs.cycles_per_year(pace) * pace / 3600.0
+    assert in_cycles + costs.standing_hours + costs.idle_hours == pytest.approx(8760.0)
+    said = f"For {costs.standing_hours:,.0f} h a year".replace(",", " ")
+    assert said in counted_with(costs)
+    assert "stands still" not in counted_with(replace(costs, availability=1.0))
 
 
 def test_the_largest_quarter_of_an_hour_lies_between_mean_and_largest_step(

@@ -12,6 +12,7 @@ from ir_msgs_py.savings import one_sided
 from ir_recorder import Analysis, Finding, analyse, findings
 from ir_recorder.report import report_html
 from ir_recorder.report.headline import failing, run_tiles, source, tiles, verdict
+from ir_recorder.report.number_text import joules, millimetres
 
 
 def not_driven(analysis: Analysis) -> Analysis:
@@ -72,7 +73,36 @@ def test_a_plan_without_a_drive_says_whether_it_is_proved(analysis: Analysis) ->
         own = replace(plan, recording=replace(plan.recording, planned_certified=proved))
         shown = verdict((), own)
         assert f"{word}: no collision, within limits" in shown
-        assert "good" not in shown
+        assert ("good" in shown) is proved
+
+
+def test_the_page_of_a_plan_shows_its_steps_and_no_empty_part(analysis: Analysis) -> None:
+    """Once it had five parts with "Nothing was recorded" and none with what is in the file."""
+    plan = not_driven(analysis)
+    page = report_html(plan, findings(plan))
+    assert "Nothing was recorded" not in page
+    assert "0 hold" not in page
+    steps = page.split('id="steps"')[1].partition("</details>")[0]
+    for step in plan.recording.planned:
+        assert joules(step.report.energy) in steps
+        assert step.is_pause or millimetres(step.report.min_clearance) in steps
+    count = sum(step.report.certified for step in plan.recording.planned if not step.is_pause)
+    assert steps.count(">proved<") == count
+
+
+def test_a_plan_without_a_comparison_is_called_what_it_costs(analysis: Analysis) -> None:
+    """Once its head was "what the plan saves" over what it costs, and that of shifts alone."""
+    plan = not_driven(analysis).recording
+    alone = analyse(replace(plan, savings=(), facts=(("plan", "never driven"),)))
+    page = report_html(alone, ())
+    answer = page.split('id="answer"')[1].partition("</section>")[0]
+    assert "what the plan costs" in page
+    assert "what the plan saves" not in page
+    assert "a year in shifts</b>" in answer
+    assert "hibernation or brakes only" in answer
+    assert "No comparison in this file" in answer
+    assert "predicted: planned program, predicted" not in answer.lower()
+    assert "216 EUR a year, at most" not in answer
 
 
 def test_shortened_pauses_stand_beside_the_energy_of_the_full_cycle(analysis: Analysis) -> None:

@@ -221,6 +221,8 @@ def _step(columns: Columns, place: str, seconds: float) -> PlannedMovement:
             energy_high=number("energy_high"),
             peak_power=number("peak_power"),
             min_clearance=number("min_clearance"),
+            certified=number("certified") == 1.0,
+            safety_distance=number("safety_distance"),
         ),
     )
 

@@ -37,6 +37,7 @@ from ir_recorder.report.number_text import (
     text,
     watt_hours,
     watts,
+    whole,
 )
 from ir_recorder.report.tables import COMPACT, bar, table
 from ir_values.errors import InvalidValueError, IrError
@@ -171,6 +172,11 @@ class Costs:
     def production_hours(self) -> float:
         """Hours of shifts in a year."""
         return self.shift_hours * self.shifts_per_day * self.days_per_year
+
+    @property
+    def standing_hours(self) -> float:
+        """Hours of a year within the shifts in which no cycle runs."""
+        return self.production_hours * (1.0 - self.availability)
 
     @property
     def idle_hours(self) -> float:
@@ -323,8 +329,7 @@ def _counts(pace: float, costs: Costs) -> tuple[float, float, float]:
 
 def cycles_of_year(pace: float, costs: Costs) -> str:
     """How many cycles a year counts, in words."""
-    made = f"{costs.cycles_per_year(pace):,.0f}".replace(",", " ")
-    return f"{made} cycles, one each {seconds(pace)}"
+    return f"{whole(costs.cycles_per_year(pace))} cycles, one each {seconds(pace)}"
 
 
 def idle_money(energy: float, costs: Costs) -> str:
@@ -379,7 +384,7 @@ def money(value: float, currency: str) -> str:
     if not math.isfinite(value):
         return DASH
     if abs(value) >= _NO_CENTS:
-        shown = f"{value:,.0f}".replace(",", " ")
+        shown = whole(value)
     elif abs(value) >= 1.0:
         shown = f"{value:.2f}"
     else:
@@ -422,11 +427,11 @@ def yearly_span(low: float, high: float) -> str:
 
 def _span_of_money(low: float, high: float, least: float) -> str:
     """Two ends of one interval: both whole where one is shown so; 0 for one below `least`."""
-    whole = max(abs(low), abs(high)) >= _NO_CENTS
+    no_cents = max(abs(low), abs(high)) >= _NO_CENTS
 
     def show(value: float) -> str:
-        if whole:
-            return f"{value:,.0f}".replace(",", " ")
+        if no_cents:
+            return whole(value)
         if abs(value) < least:
             return "0"
         return f"{value:.2f}" if least == _NOTHING else money(value, "").strip()
@@ -444,13 +449,13 @@ def payback(money: Amount, costs: Costs) -> str:
     return f"pays for {hours} h of an engineer a year, at {costs.engineer_hour:g} {costs.currency}"
 
 
-def share_between(amount: Amount, whole: float) -> str:
-    """The 90 % interval of a share of `whole` [J], in percent as the share itself; "" without
+def share_between(amount: Amount, of: float) -> str:
+    """The 90 % interval of a share of `of` [J], in percent as the share itself; "" without
     one.
     """
-    if whole <= 0.0 or amount.high <= amount.low:
+    if of <= 0.0 or amount.high <= amount.low:
         return ""
-    low, high = (100.0 * end / whole for end in (amount.low, amount.high))
+    low, high = (100.0 * end / of for end in (amount.low, amount.high))
     return f"90 % interval {low:.1f} to {high:.1f} %"
 
 
@@ -506,7 +511,26 @@ def counted_with(costs: Costs) -> str:
         f"{origin if own else 'all assumed'}"
     )
     rounded = "Each amount is rounded by itself, so sums may differ by one in the last digit."
-    return f'{text(words)}: <a href="#assumed">all values, and how to give yours</a>. {rounded}'
+    return (
+        f'{text(words)}: <a href="#assumed">all values, and how to give yours</a>. '
+        f"{_stands(costs)}{rounded}"
+    )
+
+
+def _stands(costs: Costs) -> str:
+    """The hours that no amount of a year counts, in a sentence; "" where there are none."""
+    hours = costs.standing_hours
+    if hours < _SHORT:
+        return ""
+    part = 100.0 * hours / costs.production_hours
+    return (
+        f"For {whole(hours)} h a year ({part:.3g} % of the shifts) the cell stands still within "
+        "its shifts: they are not counted, before or after, as nobody knows how long each stop "
+        "lasts. "
+    )
+
+
+_SHORT = 0.5  # h a year: less is not said
 
 
 def assumed_section(costs: Costs) -> str:

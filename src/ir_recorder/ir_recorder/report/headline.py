@@ -26,6 +26,7 @@ from ir_recorder.report.answer import Answer
 from ir_recorder.report.costs import (
     NAMES,
     Costs,
+    IdleSaving,
     cycles_of_year,
     demand_money,
     money_of_thousand,
@@ -106,10 +107,10 @@ def source(analysis: Analysis) -> str:
 
 def checked(checks: Sequence[Finding], analysis: Analysis | None = None) -> tuple[Verdict, str]:
     """The verdict over all checks in a sentence; of a plan that was not driven, what was proved."""
-    made = any(check.verdict is not Verdict.NOT_CHECKED for check in checks)
-    if analysis is not None and analysis.recording.only_planned and not made:
-        proved = "" if analysis.recording.planned_certified else "not "
-        return Verdict.NOT_CHECKED, f"{proved}proved: no collision, within limits"
+    if analysis is not None and only_proved(checks, analysis):
+        proved = analysis.recording.planned_certified
+        kind = Verdict.HOLDS if proved else Verdict.NOT_CHECKED
+        return kind, f"{'' if proved else 'not '}proved: no collision, within limits"
     return summary(tuple(checks))
 
 
@@ -134,10 +135,19 @@ def failing(checks: Sequence[Finding]) -> str:
 
 
 def verdict(checks: Sequence[Finding], analysis: Analysis | None = None) -> str:
-    """The verdict over all checks; green only where every check was made and holds."""
+    """The verdict over all checks; green only where every check was made and holds, or a plan that
+    was not driven is proved.
+    """
     kind, sentence = checked(checks, analysis)
     words = sentence[0].upper() + sentence[1:]
-    return f'<p class="verdict {_STYLES[kind]}"><a href="#checks">{text(words)}</a></p>'
+    place = "steps" if analysis is not None and only_proved(checks, analysis) else "checks"
+    return f'<p class="verdict {_STYLES[kind]}"><a href="#{place}">{text(words)}</a></p>'
+
+
+def only_proved(checks: Sequence[Finding], analysis: Analysis) -> bool:
+    """Whether a plan was not driven, so that there is its proof and nothing to check."""
+    made = any(check.verdict is not Verdict.NOT_CHECKED for check in checks)
+    return analysis.recording.only_planned and not made
 
 
 def notes(analysis: Analysis) -> str:
@@ -220,17 +230,36 @@ def _without_saving(analysis: Analysis, cycle: Production, paid: Paid, costs: Co
     price = energy.of(costs.money)
     taken = f"{kilowatt_hours(energy.value)}, {kilograms(costs.co2(energy.value))} CO2"
     count = costs.cycles_per_year(cycle.pace)
-    steps = [(costs.money(lever.joules * count), lever.name) for lever in levers(analysis)]
+    steps = [
+        (costs.money(lever.joules * count), f"{lever.name}, at most") for lever in levers(analysis)
+    ]
+    do = first_steps(steps, paid.idle, costs)
+    if analysis.recording.only_planned:
+        do.append(NO_COMPARISON)
     part = money_of_thousand(cycle.energy / costs.parts_per_cycle, costs)
     between = f"90 % interval {yearly_span(price.low, price.high)} {costs.currency}."
-    origin = f"{cycle.origin[0].upper()}{cycle.origin[1:]}: {cycle.name}."
+    name = f"{cycle.name[0].upper()}{cycle.name[1:]}"
+    origin = f"{name}." if cycle.origin in cycle.name else f"{name}, {cycle.origin}."
+    nights = "" if paid.idle is None else f" Outside of them {_outside(paid.idle, costs)}."
     return Answer(
-        f"{yearly_money(price.value, costs.currency)} a year",
-        f"in shifts: {taken}; {cycles_of_year(cycle.pace, costs)}.",
+        f"{yearly_money(price.value, costs.currency)} a year in shifts",
+        f"{taken}; {cycles_of_year(cycle.pace, costs)}.{nights}",
         " ".join([between if price.low < price.high else "", origin, cycle.supply]).strip(),
-        [f"{each}, at most" for each in first_steps(steps, paid.idle, costs)],
+        do,
         [f"Parts: {part}", *a_night(paid.idle, costs)],
     )
+
+
+NO_COMPARISON = (
+    "No comparison in this file: ir plan CELL --saving -o FILE or ir compare CELL holds it against "
+    "today's program"
+)
+
+
+def _outside(idle: IdleSaving, costs: Costs) -> str:
+    """What rest outside of the shifts costs a year, at least and at most."""
+    ends = yearly_span(idle.deepest, idle.left_alone)
+    return f"{ends} {costs.currency}: {idle.mode} or brakes only"
 
 
 def _paid(analysis: Analysis, costs: Costs) -> Paid:

@@ -100,6 +100,11 @@ def seconds(value: float) -> str:
     return f"{value:.2f} s" if value < 600.0 else f"{value / 60.0:.1f} min"
 
 
+def whole(value: float) -> str:
+    """A whole number, its thousands apart."""
+    return f"{value:,.0f}".replace(",", " ")
+
+
 def millimetres(value: float) -> str:
     """Metres as millimetres."""
     return f"{_fixed(value * 1000.0, 1)} mm" if math.isfinite(value) else DASH

@@ -27,6 +27,7 @@ from ir_recorder.report.headline import (
     answer,
     failing,
     notes,
+    only_proved,
     run_tiles,
     source,
     subtitle,
@@ -61,18 +62,10 @@ Chart = Callable[[Analysis], str]
 
 CHARTS: Mapping[str, Chart] = {
     "problems": lambda analysis: problem_list(analysis.problems),
-    "bars": lambda analysis: joule_bars(analysis.movements),
     "flows": sankey_section,
-    "steps": step_table,
     "tending": tending_section,
     "savings": savings_section,
     "methods": methods_section,
-    "stations": station_table,
-    "modes": mode_table,
-    "resting": resting_table,
-    "measurements": lambda analysis: measurement_table(agreement(analysis)),
-    "warnings": warning_table,
-    "facts": fact_table,
 }
 
 _ASSETS = files("ir_recorder") / "report" / "assets"
@@ -114,11 +107,11 @@ def report_html(
     known = not math.isnan(analysis.safety_distance)
     drawn = analysis.safety_distance if known else (tolerances or Tolerances()).safety_distance
     name = analysis.cell.name if analysis.cell is not None else analysis.recording.path.stem
-    shown = "what the plan saves" if analysis.recording.never_driven else "the recorded run"
+    data = page_data(analysis, drawn)
     controller = load_power_data() if analysis.cell is None else analysis.cell.robot.controller
     parts = {
-        "title": text(f"{name}: {shown}"),
-        "name": text(f"{name}: {shown}"),
+        "title": text(f"{name}: {_subject(analysis)}"),
+        "name": text(f"{name}: {_subject(analysis)}"),
         "subtitle": subtitle(analysis),
         "source": source(analysis),
         "verdict": verdict(checks, analysis),
@@ -127,21 +120,99 @@ def report_html(
         "paid": answer(analysis, prices),
         "tiles": tiles(analysis, prices),
         "run": run_tiles(analysis),
-        "capacity": text(joules(controller.dc_link_capacity_energy)),
         "costs": costs_section(analysis, prices),
         "front": folded(front_section(analysis, front)),
         "levers": lever_section(analysis, prices),
         "assumed": assumed_section(prices),
         "around": clock_section(analysis, prices),
         "line": line_section(of_recording(analysis, prices), prices),
-        "checks": check_table(checks),
+        "engineers": _engineers(analysis, checks, joules(controller.dc_link_capacity_energy)),
+        "unmoved": "" if _moves(analysis) else " hidden",
         "style": asset("page.css"),
-        "data": page_data(analysis, drawn),
+        "data": data,
         "script": "\n".join(asset(script) for script in SCRIPTS),
         **{name: chart(analysis) for name, chart in CHARTS.items()},
     }
     parts |= {name: folded(parts[name]) for name in ("savings", "methods")}
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("page.html"))
+
+
+def _subject(analysis: Analysis) -> str:
+    """What the page is about."""
+    if not analysis.recording.never_driven:
+        return "the recorded run"
+    return "what the plan costs" if analysis.savings is None else "what the plan saves"
+
+
+def _moves(analysis: Analysis) -> bool:
+    """Whether there may be a motion to show, or a cell to say why there is none: steps of a file
+    without a run have no trajectories.
+    """
+    planned = analysis.recording.planned
+    return not planned or any(step.trajectory is not None for step in planned)
+
+
+def _engineers(analysis: Analysis, checks: Sequence[Finding], capacity: str) -> str:
+    """What engineers look at, each part folded; one of which nothing was recorded is left out."""
+    places = f"<h3>Stations</h3>{station_table(analysis)}"
+    modes = f"<h3>Power modes</h3>{mode_table(analysis)}"
+    parts = [
+        fold("Energy of each movement, by consumer", _CONSUMERS, joule_bars(analysis.movements)),
+        fold(
+            "Steps of the program", _CARRIED.format(text(capacity)), step_table(analysis), "steps"
+        ),
+        fold("Stations and power modes", "", places + modes),
+        fold(
+            "Two measurements",
+            _MEASURED,
+            measurement_table(agreement(analysis)),
+            "measurements",
+        ),
+        fold("Power at rest", _RESTING, resting_table(analysis)),
+    ]
+    if not only_proved(checks, analysis):
+        parts.append(fold("Checks", "", check_table(checks), "checks", kept=True))
+        parts.append(fold("Warnings in the log", "", warning_table(analysis), kept=True))
+    parts.append(fold("The file", "", fact_table(analysis)))
+    return "\n".join(part for part in parts if part)
+
+
+_AXES = "".join(f'<span><i class="key a{k}"></i>A{k}</span> ' for k in range(1, 7))
+_CONSUMERS = (
+    '<p class="key-row"><span><i class="key base"></i>controller, drives, tool</span> '
+    f'{_AXES}<span><i class="key dissipated"></i>brake resistor</span> '
+    '<span><i class="key plan"></i>predicted</span> <span><i class="key net"></i>at the mains'
+    '</span></p><p class="hint">Net energy of each consumer: right of zero what it took, left of '
+    "zero what a braking axis returned to the others and to the capacitors. The figure beside a "
+    "bar is the net energy from the mains: the sum of both sides, but for what stays in the "
+    "capacitors.</p>"
+)
+_CARRIED = (
+    '<p class="hint">Plans carry the capacitors\' charge (up to {}) from step to step; waiting in '
+    "between takes some of it. Select a step to see it.</p>"
+)
+_MEASURED = (
+    '<p class="hint">Direct: the power meter. Indirect: recorded positions alone, differentiated '
+    "with a bandwidth of 16 Hz, with torques, losses and DC link by code of the analysis and the "
+    "figures of the data sheet; what differs is the robot, not the arithmetic. A variant takes "
+    "recorded torques.</p>"
+)
+_RESTING = (
+    '<p class="hint">Expected by the data of controller, tool and robot. Table II of the paper '
+    "applies only where the load is the paper's tool or none.</p>"
+)
+
+
+def fold(head: str, hint: str, body: str, name: str = "", *, kept: bool = False) -> str:
+    """A part that opens when its heading is chosen; "" where its body (HTML) shows neither a table
+    nor bars, unless it is kept.
+    """
+    if not kept and "<table" not in body and 'class="row"' not in body:
+        return ""
+    own = f' id="{name}"' if name else ""
+    return (
+        f'<details class="part"{own}><summary><h2>{text(head)}</h2></summary>{hint}{body}</details>'
+    )
 
 
 def folded(section: str, *, paper: bool = False) -> str:

@@ -201,17 +201,28 @@ def _of_parts(part: tuple[float, float] | None, costs: Costs) -> list[str]:
 
 
 def a_night(idle: IdleSaving | None, costs: Costs) -> list[str]:
-    """What rest between the shifts of two days costs, in words; none where shifts follow each
-    other.
+    """What rest between the shifts of two days costs, and from the last of a week to the first of
+    the next, in words; none where shifts follow each other.
     """
-    hours = 24.0 - costs.shift_hours * costs.shifts_per_day
-    if idle is None or hours <= 0.0:
+    night = 24.0 - costs.shift_hours * costs.shifts_per_day
+    rests = [("night", night)] if night > 0.0 else []
+    if costs.days_per_year <= _WORK_DAYS:
+        rests.append(("weekend", night + 48.0))
+    if idle is None:
         return []
-    today, then = (
-        yearly_money(hours / idle.hours * each, costs.currency)
-        for each in (idle.left_alone, idle.deepest)
-    )
-    return [f"A night of {hours:g} h: {then} in {idle.mode} instead of {today} on brakes"]
+    return [
+        f"A {name} of {hours:g} h: {_rest_of(hours, idle.deepest, idle, costs)} in {idle.mode} "
+        f"instead of {_rest_of(hours, idle.left_alone, idle, costs)} on brakes"
+        for name, hours in rests
+    ]
+
+
+_WORK_DAYS = 365.0 * 5.0 / 7.0  # days of production a year: with more, weekends are worked
+
+
+def _rest_of(hours: float, year: float, idle: IdleSaving, costs: Costs) -> str:
+    """So many hours' part of the money of a year outside of the shifts."""
+    return yearly_money(hours / idle.hours * year, costs.currency)
 
 
 def _year_row(

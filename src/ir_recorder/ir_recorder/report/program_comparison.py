@@ -105,6 +105,7 @@ _MEANINGS = {
 }
 Show = Callable[[float], str]
 _FIT = 0.999  # of the cycles: fewer are said
+_FEW = 100.0  # cycles a shift: fewer are shown with a decimal, as they are counted
 
 
 def paid_row(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
@@ -339,7 +340,7 @@ def basis_section(found: BeforeAfter, cell: Cell) -> str:
         "robot that is drawn from the uncertain parameters drives both programs.",
         "A year has as many cycles for every program as today's can make; in the column for the "
         "line as many as the line asks for, and there today's program waits at its end as well. "
-        "The rest of a shift, too short for a cycle, counts nothing.",
+        "A cycle that a shift's end cuts goes on in the next shift, so a shift has parts of one.",
     )
     items = "".join(f"<li>{text(one)}</li>" for one in said)
     return (
@@ -404,7 +405,7 @@ def _cycles(year: Year | None) -> str:
 
 
 def _count(cycles: float) -> str:
-    return f"{cycles:,.0f}".replace(",", " ")
+    return f"{cycles:,.{1 if cycles < _FEW else 0}f}".replace(",", " ")
 
 
 def _amount(amount: Amount | None, show: Show) -> str:

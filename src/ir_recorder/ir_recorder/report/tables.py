@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 
-from ir_msgs_py.report import TrajectoryReport
+from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_msgs_py.savings import ProgramSavings, Saving
 from ir_recorder.analysis import Analysis, Finding, Verdict
 from ir_recorder.analysis.checks import row_name
@@ -14,6 +14,7 @@ from ir_recorder.analysis.indirect import Agreement
 from ir_recorder.analysis.predicted_power import recorded_power_data
 from ir_recorder.analysis.production import OPEN, production_of, saved_amount
 from ir_recorder.analysis.results import Share, StepResult
+from ir_recorder.analysis.steps import step_label
 from ir_recorder.format import contents
 from ir_recorder.report.number_text import (
     DASH,
@@ -21,6 +22,7 @@ from ir_recorder.report.number_text import (
     joules,
     millimetres,
     mode_words,
+    modes_as_words,
     number,
     percent,
     seconds,
@@ -67,7 +69,11 @@ def _words(head: str) -> str:
 
 
 def step_table(analysis: Analysis) -> str:
-    """Every step: predicted, with its 90 % interval, against simulated or measured."""
+    """Every step: predicted, with its 90 % interval, against simulated or measured; of a plan that
+    was not driven with its certificate.
+    """
+    if not analysis.steps and analysis.recording.planned:
+        return _planned_table(analysis.recording.planned)
     found = f">{analysis.recording.origin}"
     heads = (
         "#",
@@ -82,6 +88,30 @@ def step_table(analysis: Analysis) -> str:
     )
     rows = (_step(result) for result in analysis.steps)
     return table((*heads, ">tool deviation"), rows, "Steps of the program")
+
+
+def _planned_table(steps: Sequence[PlannedMovement]) -> str:
+    heads = ("#", "step", "load", ">time", ">predicted", ">clearance", "certificate")
+    rows = (
+        (
+            str(place),
+            text(modes_as_words(step_label(step))),
+            text(step.load or DASH),
+            f"{step.duration:.2f} s",
+            joules(step.report.energy) + _predicted(step.report),
+            DASH if step.is_pause else millimetres(step.report.min_clearance),
+            _certificate(step),
+        )
+        for place, step in enumerate(steps, start=1)
+    )
+    return table(heads, rows, "Steps of the plan")
+
+
+def _certificate(step: PlannedMovement) -> str:
+    if step.is_pause:
+        return DASH
+    known = step.report.certified
+    return '<b class="good">proved</b>' if known else '<b class="bad">not certified</b>'
 
 
 def _step(result: StepResult) -> tuple[str, ...]:
