@@ -153,7 +153,7 @@ def test_a_plant_that_is_not_the_model_is_held_against_the_interval_of_a_pause(
         pause.step.movement, report=report, duration=pause.seconds, power_mode="STAND_ON_MOTORS"
     )
     step = replace(pause.step, movement=movement)
-    for share, ok in ((1.95, True), (2.1, False), (0.85, True), (0.7, False)):
+    for share, ok in ((1.75, True), (1.85, False), (0.65, True), (0.55, False)):
         result = replace(pause, step=step, energy=share * planned, stored_energy=0.0)
         own = Tolerances(within_interval=True, energy_absolute=1.0)
         check = named(findings(replace(analysis, steps=(result,)), own), "energy of")[0]
@@ -165,7 +165,7 @@ def test_power_at_rest_is_held_against_the_interval_of_what_drives_draw(analysis
     assert row.low <= row.expected <= row.high
     wide = replace(row, low=row.expected - 10.0, high=row.expected + 400.0)
     own = Tolerances(within_interval=True)
-    for watts, ok in ((790.0, True), (810.0, False), (-25.0, False)):
+    for watts, ok in ((600.0, True), (610.0, False), (-220.0, False)):
         seen = replace(wide, power=row.expected + watts)
         (check,) = named(findings(replace(analysis, plateaus=(seen,)), own), "power at rest")
         assert check.ok == ok, check
@@ -298,6 +298,22 @@ def test_a_plant_that_is_not_the_model_is_held_against_twice_the_interval(
     assert "the plant is not the model" in check(high, other).reason
     assert check(2.0 * high - report.energy + 11.0, other).verdict is Verdict.FAILS
     assert check(high + 1.0, recording).verdict is Verdict.FAILS
+
+
+def test_an_interval_that_begins_with_what_is_predicted_is_doubled_about_its_middle(
+    analysis: Analysis,
+) -> None:
+    """What the data put at zero makes nearly all robots dearer than predicted, not all of them."""
+    result = next(each for each in analysis.steps if not each.step.movement.is_pause)
+    planned = result.step.movement.report.energy
+    report = replace(result.step.movement.report, energy_low=planned, energy_high=1.4 * planned)
+    step = replace(result.step, movement=replace(result.step.movement, report=report))
+    own = Tolerances(within_interval=True, energy_absolute=1e-3 * planned)
+    for share, ok in ((0.97, True), (0.82, True), (0.78, False), (1.58, True), (1.62, False)):
+        seen = replace(result, step=step, energy=share * planned, stored_energy=0.0)
+        seen = replace(seen, straddling_energy=0.0)
+        check = named(findings(replace(analysis, steps=(seen,)), own), "energy of")[0]
+        assert check.ok == ok, check
 
 
 def step_name(result: StepResult) -> str:

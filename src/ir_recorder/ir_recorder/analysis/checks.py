@@ -293,11 +293,19 @@ def _expected(result: StepResult, share: float, bounds: Tolerances) -> tuple[flo
     least = _least(result, bounds)
     planned = share * report.energy
     if bounds.within_interval and report.energy_high > report.energy_low:
-        low, high = (2.0 * share * end - planned for end in (report.energy_low, report.energy_high))
+        low, high = _twice(share * report.energy_low, share * report.energy_high)
         why = f"the plant is not the model: twice the plan's 90 % interval and {least:.3g} J"
         return low - least, high + least, why
     bound = max(bounds.energy_relative * planned, least)
     return planned - bound, planned + bound, _share(bounds.energy_relative, least)
+
+
+def _twice(low: float, high: float) -> tuple[float, float]:
+    """The interval about the same middle that is twice as wide: what is predicted may be an end of
+    the given one, as of what the data put at zero.
+    """
+    half = (high - low) / 2.0
+    return low - half, high + half
 
 
 def _pause(name: str, result: StepResult, bounds: Tolerances) -> Iterator[Finding]:
@@ -492,8 +500,9 @@ def _at_rest(analysis: Analysis, bounds: Tolerances) -> Iterator[Finding]:
         low = row.expected - bound
         high = row.expected + bound
         if bounds.within_interval and row.high > row.low:
-            low = min(low, 2.0 * row.low - row.expected)
-            high = max(high, 2.0 * row.high - row.expected)
+            least, most = _twice(row.low, row.high)
+            low = min(low, least)
+            high = max(high, most)
             why += ", or twice the 90 % interval of what the drives draw"
         name = f"power at rest, {row_name(row)}"
         yield Finding(name, row.power, low, high, "W", why, row.expected, note)
