@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 from dataclasses import replace
@@ -227,6 +228,36 @@ def test_the_commands_of_the_terminal(tmp_path: Path, capsys: pytest.CaptureFixt
         main(["krl", "export", "open", "-o", str(source)]) == 2
     )  # never over a file that is there
     assert "is there already" in capsys.readouterr().err
+
+
+def test_what_is_exported_is_what_was_planned_as_the_loop_goes_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Without a start all doors begin where the program ends; a start of one's own counts more."""
+    stations = ["--stations", "p1", "home"]
+    source = tmp_path / "visit.src"
+
+    def exported(*more: str) -> str:
+        assert main(["export", "open", "-o", str(source), *stations, *more]) == 0
+        return capsys.readouterr().out
+
+    assert main(["plan", "open", "--json", *stations]) == 0
+    planned = json.loads(capsys.readouterr().out)
+    said = f"planned: {planned['moving_seconds']:.2f} s, {planned['moving_joules']:.0f} J"
+    assert said in exported()
+    text = source.read_text()
+    assert "PTP XHOME" in text  # a further cycle moves nothing before its first movement
+    read = ["krl", "import", str(source), str(source.with_suffix(".dat")), "--cell", "open"]
+    assert main([*read, "--json"]) == 0
+    steps = json.loads(capsys.readouterr().out)["steps"]
+    assert steps[0]["from"] == steps[-1]["to"] == "home"
+    planner = Planner("open", clock=lambda: 0.0)
+    first = planner.plan_program(stations=("p1", "home")).movements[0].trajectory
+    assert first is not None
+    assert np.array_equal(first.positions[0], planner.cell.machine_home)
+    for path in (source, source.with_suffix(".dat")):
+        path.unlink()
+    assert said not in exported("--start", "park")
 
 
 def test_a_complaint_names_file_line_and_column(

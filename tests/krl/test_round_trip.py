@@ -48,13 +48,18 @@ def check(planner: Planner, export: KrlExport) -> None:
     assert read.certified
     lasting = [one for one in read.steps if one.step.moves or one.report.duration > 0.01]
     rows: list[tuple[Any, list[Any]]] = []
-    for planned in export.steps:  # a movement may come to rest in between: on lines of a path
+    comments = [
+        (step, words)
+        for step, words in zip(export.steps, said(export), strict=True)
+        if step.duration > 0.0  # else signals at the start alone
+    ]
+    for planned, _ in comments:  # a movement may come to rest in between: on lines of a path
         mine = [lasting.pop(0)]
         while abs(sum(one.report.duration for one in mine) - planned.duration) > 0.002:
             mine.append(lasting.pop(0))
         rows.append((planned, mine))
     assert not lasting
-    for (planned, mine), (seconds, joules) in zip(rows, said(export), strict=True):
+    for (planned, mine), (_, (seconds, joules)) in zip(rows, comments, strict=True):
         assert sum(one.report.duration for one in mine) == pytest.approx(seconds, rel=SHARE)
         paid = sum(one.report.energy for one in mine)
         assert paid == pytest.approx(joules, rel=SHARE, abs=2.0), planned
@@ -119,9 +124,11 @@ def test_an_export_leaves_nothing_to_save_but_what_the_cells_program_fixes(free:
     if free:
         cell = replace(cell, program=tuple(one for step in cell.program for one in freed(step)))
     planner = Planner(cell, clock=lambda: 0.0)
-    plan = planner.plan_program(start=cell.posture("park"))
+    plan = planner.plan_program()
     assert plan.status.ok
     export = export_krl(planner, plan.movements, "cycle")
+    assert "PTP XHOME" in export.source  # where the program ends
+    check(planner, export)
     compared = before_after(planner, today_of_krl(again(planner, export)))
     assert compared.planned.found
     fixed = [note for note in compared.notes if "the cell's own program fixes" in note]
@@ -154,7 +161,7 @@ def test_every_bundled_cell_comes_back(name: str, style: str) -> None:
     stations = () if cell.program else _visits(cell)
     if not stations and not cell.program:
         pytest.skip("nothing to visit")
-    plan = planner.plan_program(stations=stations, start=cell.posture("park"))
+    plan = planner.plan_program(stations=stations)
     if not plan.status.ok:
         pytest.skip(plan.status.message)
     if style == "krc2" and any(step.kind == "cartesian" for step in plan.movements):

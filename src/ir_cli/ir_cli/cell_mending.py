@@ -317,6 +317,6 @@ def _planned(cell: Cell) -> Iterator[Suggestion]:
         (each.name, (each.name, "park")) for each in cell.stations if each.name not in visited
     ]
     for subject, stations in asked:
-        plan = planner.plan_program(stations=stations, options=options, start=cell.posture("park"))
+        plan = planner.plan_program(stations=stations, options=options)
         if not plan.status.ok:
             yield Suggestion("error", subject, plan.status.message)

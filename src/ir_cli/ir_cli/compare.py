@@ -26,12 +26,13 @@ from ir_cli.planning import (
     add_cell,
     add_options,
     add_parameters,
+    add_start,
     check_stations,
-    configuration_of,
     mains_counted,
     options_of,
     planner_of,
     sentences,
+    start_of,
     supply,
 )
 from ir_cli.trace_programs import today_of_trace
@@ -77,8 +78,7 @@ def add_compare(compare: argparse.ArgumentParser) -> None:
     compare.add_argument(
         "--stations", nargs="+", default=[], metavar="NAME", help="of PTP at 100 %%"
     )
-    words = "of PTP at 100 %%: posture or joint values (where it ends, as in production; else park)"
-    compare.add_argument("--start", default="", help=words)
+    add_start(compare, "of PTP at 100 %%: ")
     compare.add_argument(
         "--cycle-time",
         type=float,
@@ -155,8 +155,7 @@ def _found(arguments: argparse.Namespace, planner: Planner, line: ProgressLine) 
     if not endings:
         stations: Sequence[str] = arguments.stations
         check_stations(stations, planner)
-        place = arguments.start or planner.cell.cycle_start(stations)
-        start = configuration_of(place, planner, arguments.safety_distance)
+        start = start_of(arguments.start, planner, stations, arguments.safety_distance)
         return before_after_common(
             planner, stations, start, arguments.cycle_time, options, line.show
         )

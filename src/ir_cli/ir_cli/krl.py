@@ -26,12 +26,13 @@ from ir_cli.planning import (
     add_margin,
     add_options,
     add_parameters,
+    add_start,
     check_stations,
-    configuration_of,
     failed,
     options_of,
     planner_of,
     sentences,
+    start_of,
 )
 from ir_krl import Followed, parse, read_project
 from ir_krl.language import SourceFile
@@ -240,7 +241,7 @@ def add_export(write: argparse.ArgumentParser) -> None:
         help="the plant's $config.dat: take its own numbers of the same tools and bases, or free "
         "ones",
     )
-    write.add_argument("--start", default="park", help="posture or joint values (park)")
+    add_start(write)
     add_options(write)
     add_parameters(write)
     write.set_defaults(run=run_export)
@@ -291,7 +292,7 @@ def run_export(arguments: argparse.Namespace) -> int:
         planner = planner_of(arguments.cell, arguments.power_parameters)
         stations = tuple(arguments.stations)
         check_stations(stations, planner)
-        start = configuration_of(arguments.start, planner, arguments.safety_distance)
+        start = start_of(arguments.start, planner, stations, arguments.safety_distance)
         options = options_of(arguments)
         plan = planner.plan_program(
             stations=stations,

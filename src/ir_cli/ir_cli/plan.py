@@ -27,14 +27,15 @@ from ir_cli.planning import (
     add_cell,
     add_options,
     add_parameters,
+    add_start,
     check_stations,
     clock,
-    configuration_of,
     failed,
     options_of,
     planner_of,
     predicted,
     sentences,
+    start_of,
     supply,
 )
 from ir_cli.robots_plan import robots_of, run_robots
@@ -77,8 +78,7 @@ def add_plan(plan: argparse.ArgumentParser) -> None:
     )
     words = "of several robots: all together never need more; 0: no limit (0)"
     plan.add_argument("--peak-power", type=float, default=0.0, metavar="KW", help=words)
-    words = "posture or joint values (where the program ends, as in production; else park)"
-    plan.add_argument("--start", default="", help=words)
+    add_start(plan)
     plan.add_argument(
         "--saving",
         action="store_true",
@@ -122,8 +122,7 @@ def run_plan(arguments: argparse.Namespace) -> int:
         planner = _planner(arguments)
         stations = tuple(arguments.stations)
         check_stations(stations, planner)
-        place = arguments.start or planner.cell.cycle_start(stations)
-        start = configuration_of(place, planner, arguments.safety_distance)
+        start = start_of(arguments.start, planner, stations, arguments.safety_distance)
         options = options_of(arguments)
         plan = planner.plan_program(
             stations=stations,

@@ -9,7 +9,7 @@ import argparse
 import math
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TypedDict
@@ -108,6 +108,17 @@ def configuration_of(text: str, planner: Planner, margin: float, load: str = "")
     if not answer.solutions:
         raise CommandError(answer.status.message)
     return answer.solutions[0].q
+
+
+def add_start(parser: argparse.ArgumentParser, of: str = "") -> None:
+    """Where a program begins."""
+    words = f"{of}posture or joint values (where the program ends, as in production; else park)"
+    parser.add_argument("--start", default="", help=words)
+
+
+def start_of(text: str, planner: Planner, stations: Sequence[str], margin: float) -> FloatArray:
+    """Joint values (n,) rad where the program, or a visit of stations, begins."""
+    return configuration_of(text or planner.cell.cycle_start(stations), planner, margin)
 
 
 def add_cell(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:

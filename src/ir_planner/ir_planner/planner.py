@@ -568,7 +568,8 @@ class Planner:
         front_points: int = 0,
         **changes: Unpack[OptionFields],
     ) -> ProgramPlan:
-        """The cell's program, or a visit of `stations`, from start (n,), None: the park posture.
+        """The cell's program, or a visit of `stations`, from start (n,), None: where it ends, as
+        the next cycle follows in production (`Cell.cycle_start`).
 
         cycle_time [s]: 0 = as it costs least. savings: hold it against the common program.
         front_points: so many programs over the cycle time. progress: called with phase, done, total
@@ -577,7 +578,9 @@ class Planner:
         options, note = self._checked(options_with(options, changes))
         cell = self.cell
         begin = self._configuration(
-            "park" if start is None else start, "start", StatusCode.START_STATE_INVALID
+            cell.cycle_start(stations) if start is None else start,
+            "start",
+            StatusCode.START_STATE_INVALID,
         )
         request = ProgramRequest(
             cell=cell,

@@ -90,9 +90,8 @@ def _row(base: Cell, change: Change, options: PlanOptions, stations: tuple[str, 
         for name, value in change.items():
             cell = _changed(cell, name, value)
         planner.set_cell(text=cell_to_yaml(cell))
-        start = cell.posture(cell.cycle_start(stations))
         plan = planner.plan_program(
-            stations=stations, cycle_time=change.get(CYCLE_TIME, 0.0), options=chosen, start=start
+            stations=stations, cycle_time=change.get(CYCLE_TIME, 0.0), options=chosen
         )
     except (InvalidValueError, RequestError) as error:  # one that no robot carries, or can't be met
         return row | {"sentence": str(error)}

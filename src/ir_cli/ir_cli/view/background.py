@@ -199,7 +199,6 @@ class PlanWorker:
             plan = planner.plan_program(
                 stations=asked.stations,
                 options=options,
-                start=cell.posture(cell.cycle_start(asked.stations)),
                 progress=progress,
                 cancelled=old,
             )
