@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import csv
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -289,3 +290,38 @@ def test_curves_of_both_programs_are_in_step_at_every_stop(compared: BeforeAfter
     longest = max(hop.seconds for hop in compared.today.hops if hop.is_pause)
     rests = common_rests(sides)
     assert max((end - start for start, end in rests), default=longest) == pytest.approx(longest)
+
+
+_YEARLY = re.compile(r'data-head="saved a year">(?:<b>)?([\d .]+) EUR')
+
+
+def test_what_to_change_adds_up_to_the_result(compared: BeforeAfter, planner: Planner) -> None:
+    """Once the table ended with the last change, and nothing said what all of them are together."""
+    page = before_after_html(compared, planner.cell, Costs(price=20.0))
+    changes = page.split('<section id="changes">')[1].partition("</section>")[0]
+    *parts, whole = [float(each.replace(" ", "")) for each in _YEARLY.findall(changes)]
+    assert len(parts) == len(compared.changes) + 2  # nights, and all other changes
+    assert sum(parts) == pytest.approx(whole, abs=0.5 * len(parts))
+    assert f"<b>{whole:,.0f} EUR less a year</b>".replace(",", " ") in page
+
+
+def test_a_program_that_hardly_differs_is_no_column(
+    compared: BeforeAfter, planner: Planner
+) -> None:
+    same, free = compared.sides[:2]
+    energy = 1.005 * same.report.energy
+    near = replace(same.report, energy=energy, duration=same.report.duration)
+    page = before_after_html(
+        replace(compared, sides=(same, replace(free, report=near))), planner.cell
+    )
+    figures = page.split('id="figures"')[1].partition("</section>")[0]
+    assert ">free</th>" not in figures
+    assert "differ by less than 1 %" in figures
+    assert ">free</th>" in before_after_html(compared, planner.cell)
+
+
+def test_the_head_says_what_is_proved(compared: BeforeAfter, planner: Planner) -> None:
+    head = before_after_html(compared, planner.cell).partition("<main>")[0]
+    assert 'class="verdict good"' in head
+    assert "mm apart, within limits, at every instant" in head
+    assert "nothing driven" in head

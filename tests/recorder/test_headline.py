@@ -132,3 +132,25 @@ def test_a_plan_has_one_row_of_tiles_and_no_part_is_lost(analysis: Analysis) -> 
     assert shown.count('class="tile"') <= 6
     for part in ("movements", "pauses"):
         assert re.search(rf"<small>{part} [\d.]+ Wh in [\d.]+ s</small>", shown), part
+
+
+def test_what_is_left_is_not_what_the_plan_saves(analysis: Analysis) -> None:
+    """Once one table had both, the nights of the saving above pauses of the plan."""
+    assert analysis.savings is not None
+    page = report_html(analysis, findings(analysis))
+    left = page.split('id="levers"')[1].partition("</section>")[0]
+    assert "What is still left after this plan" in left
+    assert "at night and at weekends" not in left
+    bare = analyse(replace(analysis.recording, savings=()))
+    alone = report_html(bare, findings(bare)).split('id="levers"')[1].partition("</section>")[0]
+    assert "What to change first" in alone
+    assert "at night and at weekends" in alone
+
+
+def test_a_verdict_says_what_kind_of_checks_hold(analysis: Analysis) -> None:
+    good = [Finding("x", measured=1.0, low=0.0, high=2.0, unit="W", reason="")] * 2
+    assert "Driven in simulation: 2 checks of safety, time and energy hold" in verdict(
+        good, analysis
+    )
+    real = replace(analysis, recording=replace(analysis.recording, hardware="KR210"))
+    assert ">Driven: 2 checks" in verdict(good, real)

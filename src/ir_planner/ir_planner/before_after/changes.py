@@ -263,7 +263,7 @@ def _paused(before: CostedHop, after: CostedHop) -> tuple[int, str]:
     shown = [mode.replace(">", ", then ").replace("_", " ").lower() for mode in modes]
     if modes[0] == modes[1]:
         return TIMES, f"{after.seconds:.2f} s instead of {before.seconds:.2f} s"
-    today = shown[0] or "what the controller does by itself"
+    today = shown[0] or "the controller's own timer, which only closes the brakes"
     return MODE, f"{shown[1] or 'stand on motors'} instead of {today}"
 
 

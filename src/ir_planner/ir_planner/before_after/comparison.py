@@ -109,10 +109,14 @@ def before_after_common(
         )
         sides.append(asking.side(LINE, cycle_time, line, waiting))
     around = (
-        f"{free.savings.around} of {free.savings.across} movements of the common program "
-        "run around bodies"
+        f"; {free.savings.around} of its {free.savings.across} movements had to be routed around "
+        "machines"
     )
-    notes = (*((around,) if free.savings.around else ()), *assumed_doors(planner.cell))
+    notes = (
+        "today's program is a reconstruction (point to point at 100 %), not a recorded one"
+        f"{around if free.savings.around else ''}",
+        *assumed_doors(planner.cell),
+    )
     return asking.answer(PTP, "common program", before, sides, notes)
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from ir_msgs_py.savings import ProgramPoint
 from ir_recorder.analysis import Analysis
+from ir_recorder.analysis.production import PREDICTED, production_of
 from ir_recorder.report.bars import TICKS, Piece, Row, bars, tick_step
 from ir_recorder.report.number_text import joules, kilowatt_hours, seconds, span_of, text
 
@@ -96,16 +97,31 @@ def front_section(analysis: Analysis, planned: Sequence[ProgramPoint] = ()) -> s
     run = program.whole if program is not None and math.isfinite(program.whole.energy) else None
     points = [
         *(
-            [Point("this run", run.seconds, run.energy, analysis.recording.origin)]
+            [Point("this run", run.seconds, run.energy, analysis.recording.origin, style="driven")]
             if run is not None
             else ()
         ),
         *(Point("", point.cycle_time, point.energy, "predicted") for point in planned),
     ]
     if total is not None:
-        points.append(Point("common program", total.seconds, total.common, "predicted"))
-        points.append(Point("planned in its time", total.seconds, total.planned, "predicted"))
+        common = Point("common program", total.seconds, total.common, "predicted", style="today")
+        ends = _planned_ends(analysis, total.planned)
+        named = "planned in its time"
+        planned_then = Point(
+            named, total.seconds, total.planned, "predicted", *ends, style="planned"
+        )
+        points += [common, planned_then]
     return front_part(points)
+
+
+def _planned_ends(analysis: Analysis, energy: float) -> tuple[float, float]:
+    """90 % interval of the plan in the common program's time, where it was not driven and has one;
+    NaN elsewhere.
+    """
+    cycle = production_of(analysis)
+    if cycle is None or cycle.origin != PREDICTED or cycle.energy != energy:
+        return math.nan, math.nan
+    return (cycle.low, cycle.high) if cycle.low < cycle.high else (math.nan, math.nan)
 
 
 def front_part(points: Sequence[Point]) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeGuard
 
-from ir_description import DescriptionFileError, load_power_data
+from ir_description import Cell, DescriptionFileError, load_power_data
 from ir_description.files import plain_yaml
 from ir_msgs_py.savings import Saving
 from ir_recorder.analysis import Analysis
@@ -297,18 +297,20 @@ def costs_section(analysis: Analysis, costs: Costs) -> str:
     cycle = production_of(analysis)
     if cycle is None:
         return ""
-    rows = [*_before(cycle, costs), _row(cycle, costs), *_saved(cycle, costs)]
+    driven = analysis.program is not None
+    rows = [*_before(cycle, costs, driven), _row(cycle, costs), *_saved(cycle, costs)]
     heads = ("", ">a cycle", ">1 000 parts", ">a shift", ">a year")
     origin = (
         f"Energy of the run is {analysis.recording.origin}"
-        if analysis.program is not None
+        if driven
         else "Nothing was driven: energy is that of the plan, predicted"
     )
     notes = "".join(f" {note[0].upper()}{note[1:]}." for note in cycle.notes)
     return (
         '<section id="costs"><h2>What a cycle costs</h2>'
         f'<p class="hint">{text(origin)}{_saving_is(cycle)}. A year has '
-        f"{cycles_of_year(cycle.pace, costs)}.{text(notes)} {counted_with(costs)}</p>"
+        f"{cycles_of_year(cycle.pace, costs)}{_waits(cycle)}.{text(notes)}"
+        f"{_bridge(analysis, cycle)} {counted_with(costs)}</p>"
         f"{table(heads, rows, 'What a cycle costs')}</section>"
     )
 
@@ -316,7 +318,31 @@ def costs_section(analysis: Analysis, costs: Costs) -> str:
 def _saving_is(cycle: Production) -> str:
     if cycle.savings is None:
         return ""
-    return "; the common program and savings are predicted, with their 90 % interval"
+    return (
+        "; the common program, the planned one and savings (the difference of both) are predicted, "
+        "with their 90 % interval"
+    )
+
+
+def _waits(cycle: Production) -> str:
+    """Why the cycles of a year are longer than the cycle, where that shows; "" elsewhere."""
+    if cycle.savings is None or seconds(cycle.pace) == seconds(cycle.seconds):
+        return ""
+    return f" as in the common program (this cycle takes {seconds(cycle.seconds)})"
+
+
+def _bridge(analysis: Analysis, cycle: Production) -> str:
+    """From the energy of the recording to that of the cycle, in a sentence; "" where there is no
+    cycle with full pauses.
+    """
+    program = analysis.program
+    if program is None or program.unshortened is None:
+        return ""
+    return text(
+        f" The recording took {kilowatt_hours(analysis.energy)}, what was measured before and "
+        f"after included; the program in it {kilowatt_hours(program.whole.energy)}, its pauses "
+        f"shortened; a cycle with full pauses {kilowatt_hours(cycle.energy)}."
+    )
 
 
 def _counts(pace: float, costs: Costs) -> tuple[float, float, float]:
@@ -337,13 +363,18 @@ def idle_money(energy: float, costs: Costs) -> str:
     return money(energy / J_PER_KWH * costs.idle_price, costs.currency)
 
 
-def _before(cycle: Production, costs: Costs) -> list[tuple[str, ...]]:
-    """The common program, where the cycle is held against it."""
+def _before(cycle: Production, costs: Costs, driven: bool) -> list[tuple[str, ...]]:
+    """The common program, where the cycle is held against it, and above a cycle that was driven
+    the planned one, which savings belong to.
+    """
     if cycle.savings is None:
         return []
     total = cycle.savings.total
     pace = total.seconds or cycle.seconds
-    return [_cycle_row("common program, predicted", pace, total.common, pace, costs)]
+    rows = [("common program, predicted", total.common)]
+    if driven:
+        rows.append(("planned program, predicted", total.planned))
+    return [_cycle_row(name, pace, energy, pace, costs) for name, energy in rows]
 
 
 def _row(cycle: Production, costs: Costs) -> tuple[str, ...]:
@@ -502,12 +533,10 @@ def counted_with(costs: Costs) -> str:
     """
     own = set(NAMES) & set(costs.given)
     origin = "as your file gives it" if own == set(NAMES) else "partly assumed"
-    hours = significant(costs.production_hours * (1.0 - costs.availability), 3)
-    between = "" if hours == "0" else f" (the other {hours} h a year of the shifts count nowhere)"
     words = (
         f"Counted with {_setting(costs, 'price')}, {costs.shifts_per_day:g} shifts of "
         f"{costs.shift_hours:g} h on {costs.days_per_year:g} days a year, "
-        f"{100.0 * costs.availability:g} % of them in cycles{between}, "
+        f"{100.0 * costs.availability:g} % of them in cycles, "
         f"{origin if own else 'all assumed'}"
     )
     rounded = "Each amount is rounded by itself, so sums may differ by one in the last digit."
@@ -590,7 +619,8 @@ def lever_section(analysis: Analysis, costs: Costs) -> str:
         )
         for lever in found
     ]
-    idle = recorded_idle_saving(analysis, costs)
+    known = cycle.savings is not None
+    idle = None if known else recorded_idle_saving(analysis, costs)
     if idle is not None:
         words = f"{idle.mode} instead of brakes that are only closed, {idle.basis}"
         name = f"at night and at weekends<small>{text(words)}</small>"
@@ -602,10 +632,12 @@ def lever_section(analysis: Analysis, costs: Costs) -> str:
         for money, name, joules in rows
     ]
     heads = ("what", ">a cycle, at most", ">a year, at most", "")
+    head = "What is still left after this plan" if known else "What to change first"
+    plan = "What the plan saves is no longer in them. " if known else ""
     return (
-        '<section id="levers"><h2>What to change first</h2><p class="hint">Upper bounds from '
+        f'<section id="levers"><h2>{head}</h2><p class="hint">{plan}Upper bounds from '
         "figures of this run, each by itself: together they count some joules twice.</p>"
-        f"{table(heads, cells, 'What to change first')}</section>"
+        f"{table(heads, cells, head)}</section>"
     )
 
 
@@ -758,6 +790,25 @@ def idle_sentence(found: IdleSaving | None, costs: Costs) -> str:
     )
 
 
+def how_to_hibernate(cell: Cell | None) -> str:
+    """Who puts the robot into hibernation, how long that takes and what to look after; "" where the
+    controller has no such input.
+    """
+    controller = None if cell is None else cell.robot.controller
+    if controller is None or _HIB not in (bit.name for bit in controller.plc_inputs):
+        return ""
+    mode = controller.mode(HIBERNATION)
+    return (
+        f"How: the PLC sets the input {_HIB} of the controller when work ends "
+        f"({mode.time_to_pause:g} s), and wakes it over the network "
+        f"{mode.regular_time_to_operate:g} s before the next begins; meanwhile the controller "
+        "isn't on the network, and one that isn't woken in time delays the first cycle."
+    )
+
+
+_HIB = "HIB"
+
+
 def _idle(analysis: Analysis, costs: Costs) -> str:
     """What the robot draws while nobody works, by power mode."""
     found = idle_watts(analysis)
@@ -784,6 +835,6 @@ def _idle(analysis: Analysis, costs: Costs) -> str:
         f'<p class="hint">{significant(costs.idle_hours, 6)} hours a year lie outside of the '
         "shifts (nights, weekends, holidays): at machine home, by the data of controller and "
         "tool. Left alone, the controller only closes the brakes. "
-        f"{text(idle_sentence(saving, costs))}</p>"
+        f"{text(idle_sentence(saving, costs))} {text(how_to_hibernate(analysis.cell))}</p>"
         f"{table(heads, rows, 'When nobody works', COMPACT)}"
     )

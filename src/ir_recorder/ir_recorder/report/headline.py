@@ -10,6 +10,7 @@ from ir_msgs_py.savings import one_sided
 from ir_recorder.analysis import Analysis, Finding, ProgramTotals, Share, Verdict, summary
 from ir_recorder.analysis.production import (
     DRIVES_ONLY,
+    PREDICTED,
     Production,
     demand_watts,
     driven_and_predicted,
@@ -51,7 +52,7 @@ from ir_recorder.report.number_text import (
     text,
     watts,
 )
-from ir_recorder.report.paid import COMMON, Paid, Tile, a_night, first_steps
+from ir_recorder.report.paid import COMMON, MOVEMENTS, PAUSES, Paid, Tile, a_night, first_steps
 
 _STYLES = {Verdict.HOLDS: "good", Verdict.FAILS: "bad", Verdict.NOT_CHECKED: "open"}
 
@@ -110,7 +111,10 @@ def checked(checks: Sequence[Finding], analysis: Analysis | None = None) -> tupl
     if analysis is not None and only_proved(checks, analysis):
         proved = analysis.recording.planned_certified
         kind = Verdict.HOLDS if proved else Verdict.NOT_CHECKED
-        return kind, f"{'' if proved else 'not '}proved: no collision, within limits"
+        return (
+            kind,
+            f"{'' if proved else 'not '}proved: no collision, within limits, at every instant",
+        )
     return summary(tuple(checks))
 
 
@@ -139,6 +143,10 @@ def verdict(checks: Sequence[Finding], analysis: Analysis | None = None) -> str:
     was not driven is proved.
     """
     kind, sentence = checked(checks, analysis)
+    if kind is Verdict.HOLDS and analysis is not None and analysis.program is not None:
+        simulated = analysis.recording.origin == "simulated"
+        where = "driven in simulation" if simulated else "driven"
+        sentence = f"{where}: {len(checks)} checks of safety, time and energy hold"
     words = sentence[0].upper() + sentence[1:]
     place = "steps" if analysis is not None and only_proved(checks, analysis) else "checks"
     return f'<p class="verdict {_STYLES[kind]}"><a href="#{place}">{text(words)}</a></p>'
@@ -211,12 +219,11 @@ def answer(analysis: Analysis, costs: Costs) -> str:
         return _without_saving(analysis, cycle, paid, costs).html()
     total = cycle.savings.total
     count = costs.cycles_per_year(total.seconds or cycle.seconds)
-    pauses = "pauses in the planned power modes"
     steps = [
         (costs.money(saving.saved * count), words)
         for words, saving in (
-            ("movements as planned", cycle.savings.movements),
-            (pauses, cycle.savings.pauses),
+            (MOVEMENTS, cycle.savings.movements),
+            (PAUSES, cycle.savings.pauses),
         )
     ]
     each = 1.0 / costs.parts_per_cycle
@@ -407,7 +414,8 @@ def yearly_tile(cycle: Production, costs: Costs) -> Tile:
     price = yearly_money(costs.money(energy), costs.currency)
     made = f"{cycles_of_year(cycle.pace, costs)} in shifts, without nights and weekends"
     lines = (made, co2, assumed, cycle.supply)
-    return Tile("a year of such cycles", price, lines)
+    how = "planned" if cycle.origin == PREDICTED else "as driven"
+    return Tile(f"costs a year in shifts, {how}", price, lines)
 
 
 def _parts(program: ProgramTotals, origin: str) -> list[Tile]:
@@ -417,7 +425,8 @@ def _parts(program: ProgramTotals, origin: str) -> list[Tile]:
     ]
     waiting = program.waiting
     of_run = share(waiting.energy, program.whole.energy)
-    lines = (f"{seconds(waiting.seconds)}, {of_run} of the run", "signals and answers; in no plan")
+    said = f"{seconds(waiting.seconds)}, {of_run} of the run's energy"
+    lines = (said, "signals and answers; in no plan")
     return [*parts, Tile("waiting between steps", joules(waiting.energy), lines)]
 
 
@@ -427,7 +436,9 @@ def _part(name: str, found: Share, planned: Share, whole: Share, origin: str) ->
         f"predicted {joules(planned.energy)}, {_against(found.energy, planned.energy, origin)}"
     )
     return Tile(
-        name, joules(found.energy), (f"{seconds(found.seconds)}, {of_run} of the run", against)
+        name,
+        joules(found.energy),
+        (f"{seconds(found.seconds)}, {of_run} of the run's energy", against),
     )
 
 

@@ -12,6 +12,7 @@ from ir_description import load_power_data
 from ir_msgs_py.savings import ProgramPoint
 from ir_recorder.analysis import Analysis, Finding, Tolerances
 from ir_recorder.analysis.indirect import agreement
+from ir_recorder.analysis.production import production_of
 from ir_recorder.report.bars import joule_bars
 from ir_recorder.report.charts import front_section
 from ir_recorder.report.costs import (
@@ -125,7 +126,7 @@ def report_html(
         "levers": lever_section(analysis, prices),
         "assumed": assumed_section(prices),
         "around": clock_section(analysis, prices),
-        "line": line_section(of_recording(analysis, prices), prices),
+        "line": line_section(of_recording(analysis, prices), prices, _in_pauses(analysis)),
         "engineers": _engineers(analysis, checks, joules(controller.dc_link_capacity_energy)),
         "unmoved": "" if _moves(analysis) else " hidden",
         "style": asset("page.css"),
@@ -142,6 +143,14 @@ def _subject(analysis: Analysis) -> str:
     if not analysis.recording.never_driven:
         return "the recorded run"
     return "what the plan costs" if analysis.savings is None else "what the plan saves"
+
+
+def _in_pauses(analysis: Analysis) -> float:
+    """The share of what the plan saves that it saves in pauses."""
+    cycle = production_of(analysis)
+    if cycle is None or cycle.savings is None or cycle.savings.total.saved <= 0.0:
+        return 0.0
+    return cycle.savings.pauses.saved / cycle.savings.total.saved
 
 
 def _moves(analysis: Analysis) -> bool:

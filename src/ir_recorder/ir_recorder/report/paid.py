@@ -40,6 +40,9 @@ class Tile:
         return f'<div class="tile"><span>{text(self.name)}</span><b>{text(self.value)}</b>{notes}</div>'  # noqa: E501
 
 
+MOVEMENTS = "movements as planned"
+PAUSES = "pauses in the planned power modes"
+"""What a plan saves with, in words."""
 COMMON = "common program"
 """What plans are held against where nobody gave today's program."""
 _COMMON = " Common program: the same stations by PTP at 100 %, its pauses left to the controller."

@@ -33,6 +33,7 @@ from ir_recorder.report.costs import (
     counted_with,
     cycles_of_year,
     demand_money,
+    how_to_hibernate,
     idle_saving,
     share_between,
     yearly_money,
@@ -54,8 +55,9 @@ from ir_recorder.report.number_text import (
     watts,
 )
 from ir_recorder.report.page import PAGE_START, asset
-from ir_recorder.report.paid import Paid, Tile, row_of
+from ir_recorder.report.paid import MOVEMENTS, PAUSES, Paid, Tile, row_of
 from ir_recorder.report.series import long_rests
+from ir_recorder.report.shell import badge
 from ir_recorder.report.step_table import TableValue, write_columns
 from ir_recorder.report.tables import bar, table
 from ir_recorder.report.whole_line import line_section, of_saving
@@ -114,17 +116,26 @@ def paid_row(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     year = year_of(found, side, costs)
     paid = _paid(found, cell, costs)
     steps = [
-        (costs.money(change.saving.saved * year.cycles_a_year), _step(change))
-        for change in found.changes
+        (costs.money(saved * year.cycles_a_year), words)
+        for words, saved in (
+            (MOVEMENTS, _saved_in(found, pauses=False)),
+            (PAUSES, _saved_in(found, pauses=True)),
+        )
     ]
     each = 1.0 / costs.parts_per_cycle
     part = (side.saving.common * each, side.report.energy * each)
     return paid.answer(costs, steps, part).html() + paid.picture(costs)
 
 
-def _step(change: StepChange) -> str:
-    """A change in a sentence, at the top of the page."""
-    return f"{change.name}{_long(change).replace(' pause of', '')}: {change.words}"
+def _saved_in(found: BeforeAfter, *, pauses: bool) -> float:
+    """What the planned program saves [J] of a cycle in its pauses, or in all else."""
+    saved = sum(
+        sign * hop.energy
+        for sign, side in ((1.0, found.today), (-1.0, found.planned))
+        for hop in side.hops
+        if hop.is_pause
+    )
+    return saved if pauses else found.planned.saving.saved - saved
 
 
 def _paid(found: BeforeAfter, cell: Cell, costs: Costs) -> Paid:
@@ -182,7 +193,7 @@ def tiles(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
 
 def figure_table(found: BeforeAfter, costs: Costs) -> str:
     """Every figure, a column for each program."""
-    sides = [found.today, *found.sides]
+    sides = [found.today, *(side for side in found.sides if not _alike(found, side))]
     years = [year_of(found, side, costs) if side.found else None for side in sides]
     rows = [
         ("the program is", text(found.name), *(_meaning(side) for side in sides[1:])),
@@ -219,7 +230,29 @@ def figure_table(found: BeforeAfter, costs: Costs) -> str:
         ("least clearance", *(_of(side, millimetres(side.report.min_clearance)) for side in sides)),
         ("clearance and limits", *(_proof(side) for side in sides)),
     ]
-    return table(("", *(f">{side.name}" for side in sides)), rows, "Figures")
+    alike = [side.name for side in found.sides if _alike(found, side)]
+    left_out = (
+        f'<p class="hint">Left out, as energy and time of a cycle differ by less than 1 % from '
+        f"\u201c{text(found.towards)}\u201d: {text(', '.join(alike))}.</p>"
+        if alike
+        else ""
+    )
+    return table(("", *(f">{side.name}" for side in sides)), rows, "Figures") + left_out
+
+
+def _alike(found: BeforeAfter, side: Side) -> bool:
+    """Whether a side is nearly the one that the changes lead to."""
+    other = found.planned
+    if side is other or not side.found or side.certified != other.certified:
+        return False
+    own, planned = side.report, other.report
+    return (
+        abs(own.energy - planned.energy) < _NEAR * planned.energy
+        and abs(own.duration - planned.duration) < _NEAR * planned.duration
+    )
+
+
+_NEAR = 0.01  # of energy and time: programs that differ by less are one column
 
 
 def demand_of(side: Side) -> float:
@@ -253,26 +286,39 @@ def change_table(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     """Rest outside of the shifts, then the changes that save most, the least work first."""
     cycles = year_of(found, found.planned, costs).cycles_a_year
     priced = [
-        (costs.money(change.saving.saved * cycles), _change(change)) for change in found.changes
+        (saved_amount(change.saving).times(cycles).of(costs.money), _change(change))
+        for change in found.changes
     ]
     idle = _idle(found, cell, costs)
     if idle is not None:
-        words = f"{idle.mode} instead of brakes that are only closed"
-        where = f"at night and at weekends<small>{WORK[MODE]}, {idle.basis}</small>"
-        priced.insert(0, (idle.saved, (where, text(words), DASH)))
-    most = max((price for price, _ in priced), default=0.0)
-    rows = [
-        (
-            f"{k}. {where}",
-            *cells,
-            text(yearly_money(price, costs.currency)),
-            bar(price, most, "planned"),
+        words = (
+            f"{idle.mode} ({watts(idle.watts_deepest)}) instead of closed brakes "
+            f"({watts(idle.watts_left_alone)}), as the controller does by itself"
         )
+        where = f"at night and at weekends<small>{WORK[MODE]}, {idle.basis}</small>"
+        priced.insert(0, (idle.money, (where, text(words), DASH)))
+    most = max((price.value for price, _ in priced), default=0.0)
+    rows = [
+        (f"{k}. {where}", *cells, _price(price, costs), bar(price.value, most, "planned"))
         for k, (price, (where, *cells)) in enumerate(priced, start=1)
     ]
+    whole_year = _paid(found, cell, costs).year(costs).money
+    rest = whole_year.value - sum(price.value for price, _ in priced)
+    if rows and whole_year.value > 0.0:
+        other = text(yearly_money(rest, costs.currency))
+        rows.append(("all other movements and pauses", "", "", other, bar(rest, most, "planned")))
+        rows.append(("<b>together</b>", "", "", _price(whole_year, costs), ""))
     none = "" if found.changes else '<p class="empty">No change saves as much as a joule.</p>'
     heads = ("where", "what to do", ">saved a cycle", ">saved a year", "")
     return none + (table(heads, rows, "Changes") if rows else "")
+
+
+def _price(amount: Amount, costs: Costs) -> str:
+    """Money of a year with its interval."""
+    ends = f"{yearly_span(amount.low, amount.high)} {costs.currency}"
+    return _cell(
+        yearly_money(amount.value, costs.currency), ends if amount.high > amount.low else ""
+    )
 
 
 def _change(change: StepChange) -> tuple[str, ...]:
@@ -287,7 +333,17 @@ def _change(change: StepChange) -> tuple[str, ...]:
 
 def _long(change: StepChange) -> str:
     """How long a pause is, which tells it from others at its place."""
-    return f", pause of {seconds(change.seconds[0])}" if change.work == MODE else ""
+    return f", pause of {_round(change.seconds[0])}" if change.work == MODE else ""
+
+
+def _round(value: float) -> str:
+    """Seconds, whole minutes as such: "30 min", "3 min"."""
+    minutes = value / 60.0
+    whole_ones = minutes >= 1.0 and abs(minutes - round(minutes)) < _SECOND / 60.0
+    return f"{minutes:.0f} min" if whole_ones else seconds(value)
+
+
+_SECOND = 0.01  # s: as seconds are shown
 
 
 def hop_table(found: BeforeAfter) -> str:
@@ -433,6 +489,19 @@ def _money(energy: Amount, costs: Costs) -> str:
     )
 
 
+def _badge(found: BeforeAfter) -> str:
+    """What is proved of the planned program, at the head of the page."""
+    side = found.planned
+    if not side.certified:
+        return badge("Not proved: see Notes", "bad")
+    kept = [step.report.safety_distance for step in side.movements if not step.is_pause]
+    apart = max(kept, default=0.0)
+    least = f", {millimetres(apart)} apart" if apart > 0.0 else ""
+    return badge(
+        f"Planned program proved: no collision{least}, within limits, at every instant", "good"
+    )
+
+
 def _proof(side: Side) -> str:
     if not side.found:
         return text(f"none: {side.problem}")
@@ -483,6 +552,8 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
             f"{found.name} ({found.kind}) against what the planner makes of the same stops"
         ),
         "problems": _problems(found, cell),
+        "proof": _badge(found),
+        "how": text(how_to_hibernate(cell)),
         "paid": paid_row(found, cell, prices),
         "tiles": tiles(found, cell, prices),
         "figures": figure_table(found, prices),
@@ -504,7 +575,9 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
 def _line(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     if not cell.robot.controller.counted:
         return ""
-    return line_section(of_saving(found.planned.saving, costs), costs)
+    saved = found.planned.saving.saved
+    share = _saved_in(found, pauses=True) / saved if saved > 0.0 else 0.0
+    return line_section(of_saving(found.planned.saving, costs), costs, share)
 
 
 def _problems(found: BeforeAfter, cell: Cell) -> str:

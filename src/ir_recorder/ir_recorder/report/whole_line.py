@@ -89,8 +89,10 @@ def of_recording(analysis: Analysis, costs: Costs) -> WholeLine | None:
     return of_saving(cycle.savings.total, costs)
 
 
-def line_section(found: WholeLine | None, costs: Costs) -> str:
-    """The saving among all consumers of a line, as a section of a page; "" where there is none."""
+def line_section(found: WholeLine | None, costs: Costs, in_pauses: float = 0.0) -> str:
+    """The saving among all consumers of a line, as a section of a page; "" where there is none.
+    in_pauses: its share that is saved in pauses, which other robots may not have.
+    """
     if found is None:
         return ""
     rows = [
@@ -116,12 +118,20 @@ def line_section(found: WholeLine | None, costs: Costs) -> str:
         f"{with_ends(found.line)} {word}, and the factory with its hall {with_ends(found.factory)} "
         f"{word}. Other consumers are taken to stay as they are."
     )
+    if in_pauses >= _MUCH:
+        hint += (
+            f" Of this robot's saving {100.0 * in_pauses:.0f} % is in its pauses: robots that "
+            "stand less save less, so this is of a line of robots that stand as much."
+        )
     heads = ("consumer", ">today", ">as planned")
     return (
         '<section id="whole-line"><h2>Of the whole line</h2>'
         f'<p class="hint">{text(hint)} {origin}</p>'
         f"{table(heads, rows, 'Of the whole line', COMPACT)}</section>"
     )
+
+
+_MUCH = 0.05  # of a saving: a smaller share is not said
 
 
 def _percent(share: float) -> str:
