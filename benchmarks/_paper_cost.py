@@ -25,7 +25,7 @@ from _regional_ours import planner_of
 from scipy.stats import kendalltau
 
 from ir_planner.scene import movement_cost
-from ir_planner.scene.planning_scene import movement_weights
+from ir_planner.scene.movement_cost import movement_weights
 from ir_values.arrays import FloatArray
 
 # per seed

@@ -30,7 +30,7 @@ from ir_planner import Goal, Planner
 from ir_planner.checks.free_space import FreeSpace
 from ir_planner.request.context import Work
 from ir_planner.scene import PlanningScene
-from ir_planner.scene.planning_scene import movement_cost, path_cost
+from ir_planner.scene.movement_cost import movement_cost, path_cost
 from ir_planner.search.genetic_correction import Genetic, corrected
 from ir_planner.search.port import Correction
 from ir_planner.search.shortcuts import fewest_corners, pulled

@@ -22,12 +22,11 @@ from ir_planner.checks.free_space import FreeSpace
 from ir_planner.curves.joint_spline import spline_through, to_ppoly, virtual_knots
 from ir_planner.errors import CancelledError
 from ir_planner.request.context import Work
+from ir_planner.scene.movement_cost import movement_cost, path_cost
 from ir_planner.scene.planning_scene import (
     PROOF_TOLERANCE,
     PlanningScene,
     load_text,
-    movement_cost,
-    path_cost,
     scene_with,
 )
 from ir_planner.search import genetic_correction

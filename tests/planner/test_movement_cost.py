@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ir_description import load_robot
-from ir_planner.scene.planning_scene import movement_cost, movement_weights, path_cost
+from ir_planner.scene.movement_cost import movement_cost, movement_weights, path_cost
 
 ROBOT = load_robot()
 WEIGHTS = movement_weights(ROBOT.link_mass, ROBOT.velocity_max)
