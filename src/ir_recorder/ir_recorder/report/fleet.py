@@ -379,6 +379,15 @@ _MOST_ROBOTS = 8  # of the first table, those that cost most: the rest is one ro
 _ROWS = 40  # of movements: the rest is one row
 _COLUMNS = 5  # of robots, those that take most: the rest is one column; the table has them all
 REST = "all others"
+# bars as wide as their section, and none on a telephone, where robots stand column below column
+_STYLE = """
+@media screen and (min-width: 701px) {
+  section#first table.compact { max-width: none; } #first td:has(> .bar) { width: 45%; }
+}
+@media (max-width: 700px) {
+  #first tr > :nth-child(3) { display: none; } #robots table.cards td.no { display: block; }
+}
+"""
 
 
 def write_fleet(
@@ -402,7 +411,7 @@ def fleet_html(
     summed = [robot for robot in robots if not robot.drives_only]
     sections = [
         _section("Robots, those that cost most first", _robots(members, robots, prices), "robots"),
-        _section("What to change first", _potential(known, summed, prices)),
+        _section("What to change first", _potential(known, summed, prices), "first"),
         _section("Month by month: driven and predicted", _months(members)),
         _problems(left_out),
         _all_robots(members, robots, prices),
@@ -425,6 +434,7 @@ def fleet_html(
         "a year of each robot, one cycle after the other",
         f"{first}{year}{row_of(shown) if shown else ''}{''.join(sections)}",
         badges=[_badge(paid, prices)],
+        style=_STYLE,
     )
 
 

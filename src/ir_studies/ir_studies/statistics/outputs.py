@@ -31,6 +31,7 @@ LINE = 26.0
 _LETTER = 7.6  # of a name in bold, on average
 _GAP = 26.0  # between names and axis: half of the first tick's words
 _RIGHT = 26.0
+_WORDS = 28.0  # more, for what is said beside an arrow
 _TOP = 8.0
 _BOTTOM = 48.0
 _INSIDE = (2.0, 98.0)  # percentiles that the axis holds; dots outside are drawn at its edge
@@ -48,11 +49,13 @@ def dots(comparisons: Sequence[Comparison], title: str) -> str:
     low = first * step
     high = last * step
     height = _TOP + LINE * len(kept) + _BOTTOM
-    left = _LETTER * max(len(each.name) for each in kept) + _GAP
+    every = np.concatenate([each.values for each in kept])
+    left = _LETTER * max(len(each.name) for each in kept) + _GAP + _WORDS * bool(every.min() < low)
+    right = WIDTH - _RIGHT - _WORDS * bool(every.max() > high)
 
     def at(value: float) -> float:
         inside = min(max(value, low), high)
-        return left + (inside - low) / (high - low) * (WIDTH - left - _RIGHT)
+        return left + (inside - low) / (high - low) * (right - left)
 
     lines = "".join(_line(each, _TOP + LINE * k, at) for k, each in enumerate(kept))
     said = "; ".join(f"{each.name}: mean {each.mean.value:+.1f} %" for each in kept)
@@ -102,7 +105,9 @@ def _line(each: Comparison, top: float, at: Callable[[float], float]) -> str:
     marks = "".join(
         _dot(value, y + _SPREAD * (2.0 * (0.618034 * k % 1.0) - 1.0), at)
         for k, value in enumerate(each.values.tolist())
+        if not _beyond(value, at)
     )
+    marks += "".join(_arrow(each.values.tolist(), way, y, at) for way in (-1, 1))
     label = f'<text class="name" x="0" y="{y + 4.0:.1f}">{text(each.name)}</text>'
     middle = at(each.mean.value)
     ends = f'y1="{y - _BAR / 2.0:.1f}" y2="{y + _BAR / 2.0:.1f}"'
@@ -116,12 +121,28 @@ def _line(each: Comparison, top: float, at: Callable[[float], float]) -> str:
 
 
 def _dot(value: float, y: float, at: Callable[[float], float]) -> str:
-    """A pair, or where it lies beyond the axis an arrow at its end."""
-    x = at(value)
-    for beyond, way in ((-math.inf, -1.0), (math.inf, 1.0)):
-        if x == at(beyond) and value != 0.0:
-            return f'<path class="out" d="M{x:.1f} {y - 3:.1f}l{5 * way:g} 3l{-5 * way:g} 3z"/>'
-    return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2"/>'
+    return f'<circle cx="{at(value):.1f}" cy="{y:.1f}" r="2"/>'
+
+
+def _beyond(value: float, at: Callable[[float], float]) -> int:
+    """-1 or 1 for a value that lies left or right of the axis, else 0."""
+    ends = {at(-math.inf): -1, at(math.inf): 1}
+    return ends.get(at(value), 0) if value != 0.0 else 0
+
+
+def _arrow(values: Sequence[float], way: int, y: float, at: Callable[[float], float]) -> str:
+    """An arrow at the end of the axis for the pairs that lie beyond it, with their values."""
+    beyond = sorted((value for value in values if _beyond(value, at) == way), key=abs)
+    if not beyond:
+        return ""
+    x = at(way * math.inf)
+    words = f"{'to ' if len(beyond) > 1 else ''}{beyond[-1]:+.0f} %"
+    anchor = "start" if way > 0 else "end"
+    return (
+        f'<path class="out" d="M{x:.1f} {y - 3:.1f}l{5 * way:g} 3l{-5 * way:g} 3z"/>'
+        f'<text class="beyond" x="{x + 8 * way:.1f}" y="{y + 4:.1f}" text-anchor="{anchor}">'
+        f"{words}</text>"
+    )
 
 
 _CSV_START = b"pair,"
@@ -159,11 +180,11 @@ _TIME_RULE = (
     "none may be slower; a rule, no finding."
 )
 _PLANNER_RULE = (
-    "A named planner gives joints laws of their own wherever it can, also where these serve the "
+    "A named planner lets joints move asynchronously wherever it can, also where this serves the "
     "objective less."
 )
 _PORTFOLIO_RULE = (
-    "The portfolio gives joints laws of their own only where these are better by the objective as "
+    "The portfolio lets joints move asynchronously only where this is better by the objective as "
     "predicted: a rule, no finding."
 )
 _ONE_ROBOT = f"One robot says little of the predicted interval; plant: {DRAWN} draws one per pair."
@@ -233,15 +254,16 @@ def summary_of(found: Findings, settings: StatisticsSettings) -> str:
 
 
 def percent(value: float) -> str:
-    """A figure in percent with its sign and two decimals, more where it is smaller; zero has no
-    sign.
+    """A figure in percent with its sign and two decimals, three where it is smaller; what rounds to
+    zero has no sign.
     """
     if not math.isfinite(value):
         return DASH
-    size = abs(value)
-    if size < ALIKE:
-        return "0.00"
-    return f"{value:+.{max(2, math.ceil(-math.log10(size)))}f}"
+    shown = f"{value:+.{2 if abs(value) >= _HUNDREDTH else 3}f}"
+    return "0.00" if shown in ("+0.000", "-0.000") else shown
+
+
+_HUNDREDTH = 0.01  # of a percent
 
 
 def _interval(mean: Mean) -> str:
@@ -294,13 +316,24 @@ def _flat(rows: Sequence[Row]) -> Iterator[dict[str, str | float | int]]:
             }
 
 
+def _robot(settings: StatisticsSettings) -> str:
+    """The simulated robot in words."""
+    if settings.plant == DRAWN:
+        return "for each pair a robot drawn from the data sheet"
+    if settings.plant.startswith("typical:"):
+        return "one robot drawn from the data sheet"
+    return f"robot {Path(settings.plant).stem}"
+
+
 def page_html(found: Findings, settings: StatisticsSettings) -> str:
     """The page as text."""
+    varied = [each for each in found.comparisons if not each.count or each.less + each.more]
+    same = [each.name for each in found.comparisons if each not in varied]
     head = Head(
         "Statistics",
         f"{settings.cell}: {found.pairs} random pairs of places, planner "
-        f"{settings.planner or 'portfolio'}, objective {settings.objective}, "
-        f"robot {settings.plant}",
+        f"{settings.planner or 'portfolio'}, objective {settings.objective.replace('_', ' ')}, "
+        f"{_robot(settings)}",
         _answer(found),
         *_verdict(found),
     )
@@ -310,15 +343,14 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
         "timings": text(_timings(found)),
         "predicted": text(_predicted(found)[0] or "No energy was measured"),
         "notes": "".join(f"<li>{text(note)}</li>" for note in notes(found, settings)),
+        "alike": text(f"Alike in all pairs: {', '.join(same)}." if same else ""),
         "comparisons": _table(
-            found.comparisons,
+            varied,
             "Asynchronous against synchronous",
             (">asynchronous, mean", ">synchronous, mean"),
         ),
-        "left_out": folded(_left_out(found)),
-        "comparison_dots": dots(
-            found.comparisons, "asynchronous less synchronous, in percent of synchronous"
-        ),
+        "left_out": folded(_left_out(found), paper=True),
+        "comparison_dots": dots(varied, "asynchronous less synchronous, in percent of synchronous"),
         "agreements": _table(
             found.agreements, "Energies of a movement", (">energy, mean", ">direct, mean")
         ),
