@@ -117,6 +117,10 @@ def test_what_is_left_behind(laid: Laid, tmp_path: Path) -> None:
     assert "<b>Not worth moving: " in answer or "No placement is shown to save" in answer
     assert "planned with one seed" in answer or "between 2 seeds" in answer
     assert '<p class="verdict open">Leave as it stands</p>' in page
+    plan = page.partition('class="plan whole"')[2].partition("</svg>")[0]
+    centimetres = 100.0 * float(np.hypot(*shift))
+    assert f">base {centimetres:.0f} cm</text>" in plan
+    assert plan.count('class="best"') == 1  # only what moved is drawn anew
     assert "Leave everything where it stands" in answer or "Plan best_1.yaml" in answer
     assert "90 % interval" in answer
     assert (
@@ -292,7 +296,10 @@ def test_a_machine_may_be_called_like_what_else_moves(
     page = (tmp_path / "out" / "index.html").read_text()
     titles = re.findall(r"<h3>(\S+), ([\d.]+) m from edge to edge", page)
     assert [title[0] for title in titles] == ["base", name]
-    assert titles[0][1] != titles[1][1]  # each with its own places
+    assert titles[0][1] == titles[1][1]  # of one scale
+    drawings = page.split('class="plan"')[1:]
+    places = [set(re.findall(r'class="dot" cx="(\S+)"', each)) for each in drawings]
+    assert places[0] != places[1]  # each with its own places
 
 
 def test_no_mark_lies_outside_its_picture(laid: Laid, tmp_path: Path) -> None:

@@ -160,7 +160,7 @@ def page_html(runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int = 
         "bindings": text(_bindings(runs, settings.planners)),
         "settings": text(settings_text(settings)),
         "data": json.dumps(
-            {"end": end, "axes": list(_curves(shown, settings.planners, end))},
+            {"end": end, "axes": list(_curves(shown, settings.planners, end, _few(ranking)))},
             separators=(",", ":"),
         ).replace("<", "\\u003c"),
     }
@@ -214,7 +214,7 @@ def _ranking_table(ranking: _Ranking) -> str:
     mine = ranking.found[ranking.winner]
     rows = [
         (
-            f"<b>{text(mine.planner)}</b><small>first</small>",
+            f"<b>{_breakable(mine.planner)}</b><small>first</small>",
             f"<b>{mine.solved}</b> of {mine.count}",
             bar(mine.success, 1.0, "planned"),
             DASH,
@@ -225,7 +225,7 @@ def _ranking_table(ranking: _Ranking) -> str:
         own = ranking.found[other.planner]
         rows.append(
             (
-                f"{text(own.planner)}<small>{_differs(other) or 'no difference'}</small>",
+                f"{_breakable(own.planner)}<small>{_differs(other) or 'no difference'}</small>",
                 f"<b>{own.solved}</b> of {own.count}",
                 bar(own.success, 1.0, ""),
                 _with_ends(other.cost),
@@ -235,6 +235,11 @@ def _ranking_table(ranking: _Ranking) -> str:
     against_it = f">cost against {ranking.winner}"
     heads = ("planner", ">solved", "", against_it, ">first answer")
     return table(heads, rows, "Who wins", COMPACT)
+
+
+def _breakable(name: str) -> str:
+    """A planner's name, which a line may break after an underscore only."""
+    return text(name).replace("_", "_<wbr>")
 
 
 def _with_ends(found: Mean) -> str:
@@ -530,7 +535,7 @@ def _cell_section(
             parts.append(f"<h3>{head}</h3>{table(_HEADS, rows, f'{title}: {head.lower()}')}")
     shown = picture + "".join(parts)
     head = f"<summary><h2>{text(title)}</h2></summary>"
-    return f'<details class="part">{head}{shown}</details>'
+    return f'<details class="part paper">{head}{shown}</details>'
 
 
 def _row(found: Figures) -> tuple[str, ...]:
@@ -553,10 +558,22 @@ def milliseconds(value: float) -> str:
     return f"{1e3 * value:,.0f} ms".replace(",", " ") if np.isfinite(value) else DASH
 
 
+_FEW = 4  # planners, the first ones, whose curves are named at their ends
+
+
+def _few(ranking: _Ranking | None) -> list[str]:
+    """Planners whose curves matter."""
+    if ranking is None:
+        return []
+    return [ranking.winner, *(other.planner for other in ranking.others)][:_FEW]
+
+
 def _curves(
-    runs: Sequence[ArenaRun], planners: Sequence[str], end: float
+    runs: Sequence[ArenaRun], planners: Sequence[str], end: float, few: Sequence[str]
 ) -> Iterator[dict[str, Json]]:
-    """Success and cost over time until `end` s, of all cells together."""
+    """Success and cost over time until `end` s, of all cells together; few: whose curves stand
+    out.
+    """
     time = np.linspace(0.0, end, GRID)
     kinds: tuple[tuple[str, Callable[..., FloatArray], float, float], ...] = (
         ("solved", success_over_time, 100.0, 0.0),
@@ -568,4 +585,6 @@ def _curves(
             **packed(Curves(name, "%", time, value, shown=True)),
             "names": list(planners),
             "ends": [float(time[-1])] * len(planners),
+            "few": [k for k, planner in enumerate(planners) if planner in few],
+            **({"most": _ABOVE} if missing else {}),
         }

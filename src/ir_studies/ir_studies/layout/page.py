@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TypeAlias
 
 import numpy as np
@@ -17,7 +18,7 @@ from ir_description import Cell, cell_to_yaml
 from ir_planner.checks import JouleInterval
 from ir_recorder.analysis.production import Amount
 from ir_recorder.report.answer import Answer
-from ir_recorder.report.bars import Piece, Row, bars
+from ir_recorder.report.bars import Piece, Row, bars, tick_step
 from ir_recorder.report.costs import Costs, assumed_section, payback, yearly_money, yearly_span
 from ir_recorder.report.files import write_output
 from ir_recorder.report.number_text import (
@@ -58,6 +59,9 @@ _AROUND = 0.6  # of the extent of all places that is shown around them
 _LEAST_M = 0.3  # m, at least
 Mark: TypeAlias = "tuple[FloatArray, str, str, str]"
 """A place (2,) m, its kind, its colour, its words."""
+Move: TypeAlias = "tuple[FloatArray, FloatArray, str]"
+"""From and to a place (2,) m, and words."""
+_CLOSE_M = 0.2  # m around a cell that is drawn whole
 _COLOURS = ("#1a7f5a", "#5aa02c", "#b5a900", "#e08a00", "#d1495b")  # from least cost to most
 
 
@@ -91,7 +95,7 @@ _MARKS = (
     ("open", "looked at only: estimated"),
     ("cross", "impossible"),
     ("given", "as given"),
-    ("best", "best_1.yaml"),
+    ("best", "placement 1, the best"),
 )
 """Marks whose kind says what they mean, and what."""
 
@@ -102,29 +106,39 @@ def _key(kind: str) -> str:
     return f'<svg class="cost key" viewBox="-9 -9 18 18" aria-hidden="true">{drawn}</svg>'
 
 
-def legend(low: float, high: float) -> str:
-    """What the colours mean."""
+def legend(low: float, high: float, kinds: Container[str]) -> str:
+    """What the colours mean, and the marks of these kinds."""
     steps = np.linspace(low, high, len(_COLOURS) + 1)
     keys = (
         f'<span><svg class="cost key" viewBox="-7.5 -7.5 15 15">'
         f'<circle r="{_radius(one):.1f}" style="fill:{one}"/></svg>'
-        f"{text(kilowatt_hours(float(at)))} …</span>"
+        f"{text(kilowatt_hours(float(at)))}</span>"
         for one, at in zip(_COLOURS, steps, strict=False)
         if math.isfinite(low)
     )
-    rest = "".join(f"<span>{_key(kind)}{words}</span>" for kind, words in _MARKS)
-    return f'<p class="key-row">{"".join(keys)}{rest}</p>'
+    rest = "".join(f"<span>{_key(kind)}{words}</span>" for kind, words in _MARKS if kind in kinds)
+    return f'<p class="key-row"><span>cost from</span>{"".join(keys)}{rest}</p>'
 
 
 class PlanView:
     """Draws places (2,) m of the world; given and best: the cell as it is and as it should be, as
-    far as it lies around places (N, 2), which all are in sight. across: m from edge to edge.
+    far as it lies around places (N, 2), which all are in sight; size: m along x and y at least.
+    across: m from edge to edge.
     """
 
-    def __init__(self, given: Cell, best: Cell | None, places: FloatArray) -> None:
-        self._outlines = [("was", one) for one in outlines(given)]
-        self._outlines += [("best", one) for one in (outlines(best) if best is not None else ())]
-        around = max(_AROUND * float(np.ptp(places, axis=0).max()), _LEAST_M)
+    def __init__(
+        self,
+        given: Cell,
+        best: Cell | None,
+        places: FloatArray,
+        size: FloatArray | None = None,
+        *,
+        close: bool = False,
+    ) -> None:
+        was = list(outlines(given))
+        moved = [one for one in (outlines(best) if best is not None else ()) if _is_new(one, was)]
+        self._outlines = [*(("was", one) for one in was), *(("best", one) for one in moved)]
+        around = _CLOSE_M if close else max(_AROUND * float(np.ptp(places, axis=0).max()), _LEAST_M)
         low = places.min(axis=0) - around
         high = places.max(axis=0) + around
         for _, points in self._outlines:  # what stands at these places is seen as a whole
@@ -132,27 +146,80 @@ class PlanView:
             if inside.all(axis=1).mean() > _MOSTLY:
                 low = np.minimum(low, points.min(axis=0))
                 high = np.maximum(high, points.max(axis=0))
-        self._low = low
-        self.across, up = (float(one) for one in high - self._low)
+        more = np.maximum((np.zeros(2) if size is None else size) - (high - low), 0.0)
+        self._low = low - 0.5 * more
+        self.size = high - low + more
+        self.across, up = (float(one) for one in self.size)
         self._scale = (WIDTH - 2 * _MARGIN) / max(self.across, up / _TALLEST)
         self._height = self._scale * up + 2 * _MARGIN
 
-    def drawn(self, name: str, marks: Sequence[Mark]) -> str:
-        """SVG with marks: place (2,), kind (dot, open, cross, given, best), colour, words."""
+    def drawn(
+        self,
+        name: str,
+        marks: Sequence[Mark],
+        moves: Sequence[Move] = (),
+        names: Mapping[str, FloatArray] = MappingProxyType({}),
+    ) -> str:
+        """SVG with marks: place (2,), kind (dot, open, cross, given, best), colour, words; moves:
+        arrows between places, with their words; names: of what stands at a place (2,).
+        """
         shapes = [
             f'<polygon class="{kind}" '
             f'points="{" ".join(f"{x:.1f},{y:.1f}" for x, y in self._at(points))}"/>'
             for kind, points in self._outlines
         ]
         shapes += [mark(*self._at(place[None])[0], *rest) for place, *rest in marks]
+        shapes += [arrow(*self._at(np.stack([start, end])), words) for start, end, words in moves]
+        for words, place in names.items():
+            x, y = self._at(place[None])[0]
+            shapes.append(f'<text class="stands" x="{x:.1f}" y="{y + 4:.1f}">{text(words)}</text>')
+        shapes.append(self._measure())
+        kind = "plan whole" if moves else "plan"
         return (
-            f'<svg class="plan" viewBox="0 0 {WIDTH:g} {self._height:.0f}" role="img" '
+            f'<svg class="{kind}" viewBox="0 0 {WIDTH:g} {self._height:.0f}" role="img" '
             f'aria-label="{text(name)}">{"".join(shapes)}</svg>'
+        )
+
+    def _measure(self) -> str:
+        """A bar of a round length, and the directions of both axes, in the lower corners."""
+        length = tick_step(self.across)
+        y = self._height - 10.0
+        x = WIDTH - 46.0
+        words = f"{length:g} m" if length >= 1.0 else f"{100.0 * length:g} cm"
+        return (
+            f'<path class="measure" d="M10 {y - 4:.1f}v4h{length * self._scale:.1f}v-4"/>'
+            f'<text class="measure" x="{16 + length * self._scale:.1f}" y="{y:.1f}">{words}</text>'
+            f'<path class="measure" d="M{x:g} {y - 26:.1f}v26h26"/>'
+            f'<text class="measure" x="{x + 29:g}" y="{y + 3:.1f}">x</text>'
+            f'<text class="measure" x="{x - 4:g}" y="{y - 30:.1f}">y</text>'
         )
 
     def _at(self, points: FloatArray) -> FloatArray:
         flat = (points - self._low) * self._scale + _MARGIN
         return np.stack([flat[:, 0], self._height - flat[:, 1]], axis=1)
+
+
+def _is_new(outline: FloatArray, others: Sequence[FloatArray]) -> bool:
+    """Whether an outline (V, 2) is none of the others, but for a tenth of a millimetre."""
+    alike = (one for one in others if one.shape == outline.shape)
+    return not any(np.allclose(one, outline, atol=1e-4) for one in alike)
+
+
+def arrow(start: FloatArray, end: FloatArray, words: str) -> str:
+    """An arrow of the drawing between places (2,), its words beyond its end."""
+    way = end - start
+    length = float(np.hypot(*way))
+    x, y = way / length if length > 0.0 else np.array([0.0, 1.0])
+    left, right = (end - 9.0 * np.array([x, y]) + side * np.array([-y, x]) for side in (4.0, -4.0))
+    head = " ".join(f"{a:.1f},{b:.1f}" for a, b in (end, left, right))
+    anchor = "start" if x >= 0.0 else "end"
+    at = end + np.array([9.0 * math.copysign(1.0, x), 12.0 * y + 4.0])
+    return (
+        f'<path class="move" d="M{start[0]:.1f} {start[1]:.1f}L{end[0]:.1f} {end[1]:.1f}"/>'
+        f'<polygon class="head" points="{head}"/>'
+        f'<text class="move" x="{at[0]:.1f}" y="{at[1]:.1f}" text-anchor="{anchor}">'
+        f"{text(words)}</text>"
+    )
 
 
 def mark(x: float, y: float, kind: str, fill: str, words: str) -> str:
@@ -170,8 +237,9 @@ def mark(x: float, y: float, kind: str, fill: str, words: str) -> str:
 
 
 def _radius(fill: str) -> float:
-    """Of a mark: what costs more is larger, so that its colour is not all that says it."""
-    return 3.4 + (0.9 * _COLOURS.index(fill) if fill in _COLOURS else 0.0)
+    """Of a mark: what costs less is larger, so that its colour is not all that says it."""
+    least = len(_COLOURS) - 1
+    return 3.4 + (0.9 * (least - _COLOURS.index(fill)) if fill in _COLOURS else 0.0)
 
 
 def outlines(cell: Cell) -> Iterator[FloatArray]:
@@ -246,7 +314,8 @@ def page_html(
         "map": "".join(_maps(known, finals, settings, cell)),
         "cost": text(cost_words(settings)),
         "beside": _beside(finals, settings),
-        "legend": legend(*shown_range(known)),
+        "moved": _moved_plan(finals, settings, cell),
+        "legend": legend(*shown_range(known), _kinds(known, finals)),
         "variables": "".join(_charts(known, finals, settings)),
         "impossible": _impossible(known),
         "settings": settings_table(asdict(settings)),
@@ -390,7 +459,7 @@ def _bars(finals: Sequence[Sequence[Final]], costs: Costs) -> str:
             year = _year(one, of_condition(given, one), costs)
             price = yearly_money(year.money.value, costs.currency)
             between = yearly_span(year.money.low, year.money.high)
-            name = f"best_{rank}.yaml"
+            name = f"placement {rank}"
             first = one is own[0]
             notes = (
                 f"{between} {costs.currency}; {kilowatt_hours(year.energy.value)} a cycle",
@@ -491,7 +560,7 @@ def _rows(finals: Sequence[Sequence[Final]], costs: Costs) -> Iterator[tuple[str
     for own in finals:
         rank += not own[0].is_given
         for one in own:
-            name = "as given" if one.is_given else f"best_{rank}.yaml"
+            name = "as given" if one.is_given else f"placement {rank}"
             if not one.solved:
                 yield name, text(one.condition.text), *[DASH] * (len(_HEADS) - 2)
                 continue
@@ -540,10 +609,60 @@ def _maps(
         if star is not None:
             marks.append((place_of(owner, star), "best", "", "best"))
         drawings.append((owner.removeprefix(_MACHINE), marks))
-    for name, marks in drawings:
-        view = PlanView(cell, star, np.array([place for place, *_ in marks]))
+    places = [np.array([place for place, *_ in marks]) for _, marks in drawings]
+    sizes = [PlanView(cell, star, each).size for each in places]
+    for (name, marks), each in zip(drawings, places, strict=True):
+        view = PlanView(cell, star, each, np.max(sizes, axis=0))
         title = f"{name}, {view.across:.1f} m from edge to edge"
         yield f"<div><h3>{text(title)}</h3>{view.drawn(f'Where {name} stands', marks)}</div>"
+
+
+def _kinds(known: Sequence[Known], finals: Sequence[Sequence[Final]]) -> set[str]:
+    """Kinds of the marks that maps have."""
+    costs = estimates(known)
+    marks = {_mark_of(one, cost, (0.0, 0.0))[0] for one, cost in zip(known, costs, strict=True)}
+    return {*marks, "given"} | ({"best"} if ends(finals)[1] else set())
+
+
+_LEAST_MOVE = 5e-3  # m: less is not drawn
+
+
+def _moved_plan(finals: Sequence[Sequence[Final]], settings: LayoutSettings, cell: Cell) -> str:
+    """A section: the whole cell from above as it is and by the best placement, an arrow for all
+    that moves; "" where nothing does.
+    """
+    _, best = ends(finals)
+    if best is None:
+        return ""
+    values = best[0].placement.values
+    star = settings.placing.cell(cell, values)
+    moves: dict[str, Move] = {}
+    for owner in dict.fromkeys(v.owner for v in settings.variables):
+        if owner != "base" and not owner.startswith(_MACHINE):
+            continue
+        start, end = place_of(owner, cell), place_of(owner, star)
+        along = float(np.hypot(*(end - start)))
+        up = values.get(f"{owner}.z", 0.0)
+        said = [f"{100.0 * along:.0f} cm"] if along >= _LEAST_MOVE else []
+        said += [f"{'up' if up > 0.0 else 'down'} {100.0 * abs(up):.0f} cm"] if up else []
+        if said:
+            moves[owner] = (start, end, f"{owner.removeprefix(_MACHINE)} {', '.join(said)}")
+    if not moves:
+        return ""
+    names = {
+        machine.name: np.array(machine.pose[:2, 3])
+        for machine in cell.equipment
+        if f"{_MACHINE}{machine.name}" not in moves
+    }
+    near = np.vstack([points for one in (cell, star) for points in outlines(one)])
+    view = PlanView(cell, star, near, close=True)
+    words = "; ".join(each for *_, each in moves.values())
+    drawn = view.drawn(f"The cell from above, moved: {words}", [], list(moves.values()), names)
+    return (
+        '<section id="moved"><h2>The cell from above, as given and by placement 1</h2>'
+        '<p class="hint">Grey: as given; dashed: placement 1, the best. Arrows: what moves, and '
+        f"how far.</p>{drawn}</section>"
+    )
 
 
 def place_of(owner: str, cell: Cell) -> FloatArray:

@@ -3,6 +3,7 @@
 
 /* How named curves differ, as in marks.py: a colour, a mark, and beyond seven a dash too. */
 const COLOURS = 7, DASHES = [[], [7, 4], [2, 3]], APART = 90; /* pixels between the marks on a curve */
+const ENDS = 84, LINE = 13; /* pixels of names at the ends of curves, wide and high */
 const MARKS = [
   "M-4 0A4 4 0 1 0 4 0A4 4 0 1 0 -4 0Z", "M-3.6 -3.6H3.6V3.6H-3.6Z", "M0 -4.8L4.6 3.4H-4.6Z", "M0 -5.2L5.2 0L0 5.2L-5.2 0Z",
   "M0 4.8L4.6 -3.4H-4.6Z", "M-1.4 -4.6H1.4V-1.4H4.6V1.4H1.4V4.6H-1.4V1.4H-4.6V-1.4H-1.4Z", "M-5 -2H5V2H-5Z", "M-2 -5H2V5H-2Z",
@@ -29,8 +30,12 @@ class AxesChart extends TimeChart {
     this.low = curves.low ? scaled(curves.low) : this.high;
     this.shown = shown;
     this.top = 8;
-    this.right = 14;
+    this.right = curves.few ? ENDS : 14;
   }
+  /* Curves that matter, where not all do: named at their ends, the others pale and without marks. */
+  matters(k) { return !this.curves.few || this.curves.few.includes(k); }
+  /* Whether a value is not drawn as it lies above what is shown. */
+  beyond(value) { return this.curves.most !== undefined && value >= 0.999 * this.curves.most; }
   names() {
     if (this.curves.names) return this.curves.names;
     return this.curves.series === "tool" ? ["tool"] : Array.from({ length: this.curves.count }, (_, k) => `A${k + 1}`);
@@ -60,12 +65,31 @@ class AxesChart extends TimeChart {
         g.setLineDash([]);
       }
       if (named) g.setLineDash(named.dash);
+      g.globalAlpha = this.matters(k) ? 1 : 0.35;
       this.curve(g, k, first, until, y);
       g.setLineDash([]);
-      if (named) this.marks(g, k, y, named);
+      g.globalAlpha = 1;
+      if (named && this.matters(k)) this.marks(g, k, y, named);
     }
     g.restore();
+    if (this.curves.few) this.ends(g, axes, until, y);
     this.cursor(g);
+  }
+  /* Names at the ends of the curves that matter, below each other. */
+  ends(g, axes, until, y) {
+    const n = this.curves.count, value = (k) => this.high[until * n + k], names = this.names();
+    const found = axes.filter((k) => this.matters(k) && !this.beyond(value(k))).sort((a, b) => value(b) - value(a));
+    const lowest = this.height - this.bottom - LINE * (found.length - 1);
+    let next = this.top + LINE / 2;
+    g.textAlign = "left";
+    g.textBaseline = "middle";
+    found.forEach((k, place) => {
+      next = Math.max(next, Math.min(y(value(k)), lowest + LINE * place));
+      g.fillStyle = css("--ink");
+      g.fillText(names[k], this.width - this.right + 6, next);
+      next += LINE;
+    });
+    g.textBaseline = "alphabetic";
   }
   /* One column of pixels shows the span of all values in it. */
   curve(g, k, first, until, y) {
@@ -81,6 +105,7 @@ class AxesChart extends TimeChart {
     g.beginPath();
     const last = this.curves.ends ? Math.min(until, floorIndex(this.times, this.curves.ends[k])) : until;
     for (let i = first; i <= last; i++) {
+      if (this.beyond(this.high[i * n + k])) { put(); column = NaN; begun = false; continue; }
       const x = Math.round(this.x(this.times[i]) * 2) / 2;
       if (x === column) { low = Math.min(low, this.low[i * n + k]); high = Math.max(high, this.high[i * n + k]); continue; }
       put();
@@ -97,8 +122,10 @@ class AxesChart extends TimeChart {
     for (let x = this.left + (0.3 + k / n) * APART; x < this.width - this.right; x += APART) {
       const time = this.time(x);
       if (time > last) break;
+      const value = this.high[floorIndex(this.times, time) * n + k];
+      if (this.beyond(value)) continue;
       g.save();
-      g.translate(x, y(this.high[floorIndex(this.times, time) * n + k]));
+      g.translate(x, y(value));
       g.fill(path);
       g.restore();
     }
