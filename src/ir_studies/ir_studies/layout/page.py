@@ -169,7 +169,9 @@ class PlanView:
             for kind, points in self._outlines
         ]
         shapes += [mark(*self._at(place[None])[0], *rest) for place, *rest in marks]
-        shapes += [arrow(*self._at(np.stack([start, end])), words) for start, end, words in moves]
+        for start, end, words in moves:
+            tail, tip = self._at(np.stack([start, end]))
+            shapes.append(arrow(tail, tip, words))
         for words, place in names.items():
             x, y = self._at(place[None])[0]
             shapes.append(f'<text class="stands" x="{x:.1f}" y="{y + 4:.1f}">{text(words)}</text>')
