@@ -116,6 +116,7 @@ def test_what_is_left_behind(laid: Laid, tmp_path: Path) -> None:
     answer = page.partition('id="answer"')[2].partition("</section>")[0]
     assert "<b>Not worth moving: " in answer or "No placement is shown to save" in answer
     assert "planned with one seed" in answer or "between 2 seeds" in answer
+    assert ("planned with one seed" in answer) == (">one seed</td>" in page)
     assert '<p class="verdict open">Leave as it stands</p>' in page
     plan = page.partition('class="plan whole"')[2].partition("</svg>")[0]
     centimetres = 100.0 * float(np.hypot(*shift))

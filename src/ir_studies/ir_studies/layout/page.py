@@ -582,7 +582,7 @@ def _rows(finals: Sequence[Sequence[Final]], costs: Costs) -> Iterator[tuple[str
                 _with_interval(kilowatt_hours(one.mean()), one.interval),
                 kilowatt_hours(one.mean("moving_j")),
                 seconds(one.mean("duration_s")), millimetres(one.mean("clearance_m")),
-                kilowatt_hours(one.spread()),
+                kilowatt_hours(one.spread()) if len(one.rows) > 1 else "one seed",
             )  # fmt: skip
 
 
