@@ -259,7 +259,7 @@ def _without_saving(analysis: Analysis, cycle: Production, paid: Paid, costs: Co
 
 NO_COMPARISON = (
     "No comparison in this file: ir plan CELL --saving -o FILE or ir compare CELL holds it against "
-    "today's program"
+    "today's program, and counts as many cycles a year as that makes"
 )
 
 
@@ -283,7 +283,8 @@ def _paid(analysis: Analysis, costs: Costs) -> Paid:
     said = f", {cycles_of_year(pace, costs)}"
     driven = None
     if analysis.program is not None:
-        name = f"as driven, {analysis.recording.origin}"
+        nights = "" if idle is None else ", nights on brakes"
+        name = f"as driven, {analysis.recording.origin}{nights}"
         driven = (name, costs.energy_of_year(cycle).value)
     return Paid(saved, common, idle, said, COMMON, driven, cycle.supply)
 

@@ -168,7 +168,11 @@ def _engineers(analysis: Analysis, checks: Sequence[Finding], capacity: str) -> 
     parts = [
         fold("Energy of each movement, by consumer", _CONSUMERS, joule_bars(analysis.movements)),
         fold(
-            "Steps of the program", _CARRIED.format(text(capacity)), step_table(analysis), "steps"
+            "Steps of the program",
+            _CARRIED.format(text(capacity)),
+            step_table(analysis),
+            "steps",
+            unfolded=analysis.recording.only_planned,
         ),
         fold("Stations and power modes", "", places + modes),
         fold(
@@ -212,13 +216,16 @@ _RESTING = (
 )
 
 
-def fold(head: str, hint: str, body: str, name: str = "", *, kept: bool = False) -> str:
-    """A part that opens when its heading is chosen; "" where its body (HTML) shows neither a table
-    nor bars, unless it is kept.
+def fold(
+    head: str, hint: str, body: str, name: str = "", *, kept: bool = False, unfolded: bool = False
+) -> str:
+    """A part that opens when its heading is chosen, or is open at first (unfolded); "" where its
+    body (HTML) shows neither a table nor bars, unless it is kept.
     """
     if not kept and "<table" not in body and 'class="row"' not in body:
         return ""
     own = f' id="{name}"' if name else ""
+    own += " open" if unfolded else ""
     return (
         f'<details class="part"{own}><summary><h2>{text(head)}</h2></summary>{hint}{body}</details>'
     )

@@ -497,9 +497,7 @@ def _badge(found: BeforeAfter) -> str:
     kept = [step.report.safety_distance for step in side.movements if not step.is_pause]
     apart = max(kept, default=0.0)
     least = f", {millimetres(apart)} apart" if apart > 0.0 else ""
-    return badge(
-        f"Planned program proved: no collision{least}, within limits, at every instant", "good"
-    )
+    return badge(f"Proved: no collision{least}, within limits, at every instant", "good")
 
 
 def _proof(side: Side) -> str:
