@@ -85,7 +85,7 @@ def test_every_control_of_the_page_works(browser: Any, file: Path, tmp_path: Pat
     page.run("document.querySelectorAll('button.export').forEach((button) => button.click())")
     saved = wait_for(lambda: sorted(tmp_path.glob("what_a_cycle_costs.csv")), page)
     assert "full" in saved[0].read_text() or "this run" in saved[0].read_text()
-    assert saved[0].read_text().count("\n") == 6
+    assert saved[0].read_text().count("\n") == 7
     charts = page.run(
         "document.querySelectorAll('main canvas, main .figure svg, main .bars').length"
     )

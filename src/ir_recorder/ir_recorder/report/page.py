@@ -169,7 +169,7 @@ def _engineers(analysis: Analysis, checks: Sequence[Finding], capacity: str) -> 
         fold("Energy of each movement, by consumer", _CONSUMERS, joule_bars(analysis.movements)),
         fold(
             "Steps of the program",
-            _CARRIED.format(text(capacity)),
+            _CARRIED.format(text(capacity), " Select a step to see it." if analysis.steps else ""),
             step_table(analysis),
             "steps",
             unfolded=analysis.recording.only_planned,
@@ -202,7 +202,7 @@ _CONSUMERS = (
 )
 _CARRIED = (
     '<p class="hint">Plans carry the capacitors\' charge (up to {}) from step to step; waiting in '
-    "between takes some of it. Select a step to see it.</p>"
+    "between takes some of it.{}</p>"
 )
 _MEASURED = (
     '<p class="hint">Direct: the power meter. Indirect: recorded positions alone, differentiated '
