@@ -178,10 +178,13 @@ def messages(
     q = motion(rng)
     whole = [_egm(k, row) for k, row in enumerate(q)]
     counted = [_varint(len(each)) + each for each in whole]
+    near = np.argsort(np.arange(COUNT) + rng.uniform(0.0, 5.0, COUNT))
     files = {
         "datagrams": (b"".join(whole), True),
         "lengths before them": (b"".join(counted), True),
-        "shuffled": (b"".join(counted[k] for k in rng.permutation(COUNT)), True),
+        "some overtake others": (b"".join(counted[k] for k in near), True),
+        "shuffled": (b"".join(counted[k] for k in rng.permutation(COUNT)), False),
+        "two sessions": (b"".join(counted + counted[::2]), False),
         "cut": (b"".join(counted)[:-9], True),
         "some are gone": (b"".join(counted[:50] + counted[60:]), True),
         "seven joints": (b"".join(_egm(k, np.append(row, 0)) for k, row in enumerate(q)), False),

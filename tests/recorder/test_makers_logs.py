@@ -249,8 +249,10 @@ def field(number: int, value: int | bytes) -> bytes:
     return varint(number << 3 | 2) + varint(len(value)) + value
 
 
-def egm(number: int, joints: np.ndarray, *, clock: bool, packed: bool = False) -> bytes:
-    """A message EgmRobot, by the numbers of ABB's egm.proto."""
+def egm(
+    number: int, joints: np.ndarray, *, clock: bool, packed: bool = False, begin: int = 0
+) -> bytes:
+    """A message EgmRobot, by the numbers of ABB's egm.proto. begin: the clock's ms at number 0."""
     values = (
         field(1, np.asarray(joints, "<f8").tobytes())
         if packed
@@ -258,7 +260,7 @@ def egm(number: int, joints: np.ndarray, *, clock: bool, packed: bool = False) -
     )
     seconds, rest = divmod(1_700_000_000_000 + 4 * number, 1000)
     time = field(4, field(1, seconds) + field(2, 1000 * rest)) if clock else b""
-    header = field(1, number) + field(2, 4 * number) + field(3, 2)
+    header = field(1, number) + field(2, (begin + 4 * number) % 2**32) + field(3, 2)
     pose = field(2, field(1, b"\x09" + bytes(8)))
     return (
         field(1, header) + field(2, field(1, values) + pose + time) + field(10, b"\x09" + bytes(8))
@@ -292,6 +294,51 @@ def test_messages_of_egm(tmp_path: Path, frame: str, clock: bool) -> None:
     assert "1 messages came late" in said
     assert "have the time of another one" in said
     assert "bytes at the end" in said
+
+
+def test_late_messages_of_egm_are_counted_and_a_second_session_is_refused(tmp_path: Path) -> None:
+    """Ten steps are the bound: within it no order of two sessions looks like one."""
+    path = tmp_path / "log.egm"
+    messages = [
+        varint(len(m)) + m for m in (egm(k, r, clock=False) for k, r in enumerate(degrees()))
+    ]
+    held = 5
+    for delay in (1, 9, 10, 11):
+        moved = messages[:held] + messages[held + 1 : held + 1 + delay]
+        path.write_bytes(b"".join([*moved, messages[held], *messages[held + 1 + delay :]]))
+        if delay > 10:
+            with pytest.raises(RecorderError, match=r"message 17 .*time is 0\.02 s, 0\.064 s"):
+                read(path)
+            continue
+        trace = read(path)
+        check(trace, 0.004)
+        assert any(each.startswith("1 messages came late") for each in trace.problems)
+    block = messages[:20] + messages[23:26] + messages[20:23] + messages[26:]
+    path.write_bytes(b"".join(block))
+    trace = read(path)
+    check(trace, 0.004)
+    assert any(each.startswith("3 messages came late") for each in trace.problems)
+    again = [egm(k, row + 1.0, clock=False, begin=2) for k, row in enumerate(degrees())]
+    path.write_bytes(b"".join([*messages, *(varint(len(each)) + each for each in again)]))
+    last = 0.004 * (len(messages) - 1)
+    said = rf"message {len(messages) + 1} .*number 0\): time is 0\.002 s, {last:g} s came before"
+    with pytest.raises(RecorderError, match=said):
+        read(path)
+
+
+def test_the_clock_of_egm_goes_on_where_its_32_bits_end(tmp_path: Path) -> None:
+    path = tmp_path / "log.egm"
+    rows = list(enumerate(degrees()))
+    whole = [egm(k, row, clock=False, begin=2**32 - 40) for k, row in rows]
+    for messages in (whole, [*whole[:9], whole[10], whole[9], *whole[11:]]):
+        path.write_bytes(b"".join(varint(len(each)) + each for each in messages))
+        trace = read(path)
+        check(trace, 0.004)
+        assert any("begins again at 2^32: 1 times" in each for each in trace.problems)
+    far = [egm(k, row, clock=False, begin=-(2**31) if k < 9 else 0) for k, row in rows]
+    path.write_bytes(b"".join(varint(len(each)) + each for each in far))
+    with pytest.raises(RecorderError, match="the clock began anew"):
+        read(path)
 
 
 def test_what_is_no_log_of_a_robots_egm_is_refused(tmp_path: Path) -> None:

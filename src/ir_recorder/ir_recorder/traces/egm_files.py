@@ -2,7 +2,8 @@
 
 The messages are protobuf. They stand one after the other, each with its length before it (as a
 varint, or in 4 bytes) or without; the way that explains the whole file is taken. Joints are in
-degrees and the header's time in ms, as ABB's egm.proto says.
+degrees and the header's time in ms, as ABB's egm.proto says: in 32 bits, so it begins again every
+49.7 days.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 from ir_recorder.errors import RecorderError
 from ir_recorder.traces.table_files import VALUES_MAX, opened
 from ir_recorder.traces.trace import Trace
+from ir_values.arrays import FloatArray
 
 _VARINT = 0
 _EIGHT = 1
@@ -34,6 +36,13 @@ _EXTERNAL = 3
 _CLOCK = 4
 _DATA = 2  # type of the robot's messages
 _MS = 1e-3
+_WRAP = 2**32 * _MS  # s after which the header's time begins again
+_WRAP_NEAR = (
+    60.0  # s: a step back by _WRAP within this is a wrap, messages missing around it or not
+)
+# usual steps that a message may come late: datagrams overtake each other by a few, and where the
+# clock goes back farther the robot began anew
+_LATE = 10
 _LENGTH_MAX = 65_535  # bytes of a datagram
 _TAG_OF_HEADER = b"\x0a"
 
@@ -72,10 +81,13 @@ def read_egm(path: Path, joint_names: Sequence[str]) -> Trace:
     notes += [f"{cut} bytes at the end are no whole message: left out"] if cut else []
     if others:
         notes.append(f"{others} messages are not the robot's (EgmRobot with feedback): left out")
-    time = np.array([row.time for row in rows])
+    time, wraps = _unwrapped(np.array([row.time for row in rows]))
+    notes += (
+        [f"the time in ms begins again at 2^32: {wraps} times, taken as going on"] if wraps else []
+    )
+    late = _late(time, rows, path)
+    notes += [f"{late} messages came late: put in order of time"] if late else []
     order = np.argsort(time, kind="stable")
-    if (np.diff(order) < 0).any():
-        notes.append(f"{int((np.diff(time) < 0.0).sum())} messages came late: put in order of time")
     kept = order[np.concatenate([[True], np.diff(time[order]) > 0.0])]
     if len(kept) < len(rows):
         notes.append(f"{len(rows) - len(kept)} messages have the time of another one: left out")
@@ -88,6 +100,34 @@ def read_egm(path: Path, joint_names: Sequence[str]) -> Trace:
     columns = {name: np.ascontiguousarray(joints[:, k]) for k, name in enumerate(joint_names)}
     seconds = time[kept] - time[kept[0]]
     return Trace(str(path), seconds, MappingProxyType(columns), problems=tuple(notes))
+
+
+def _unwrapped(time: FloatArray) -> tuple[FloatArray, int]:
+    """Time (N,) s that goes on where the clock of 32 bits begins again, and how often it does."""
+    steps = np.diff(time)
+    turns = np.zeros(len(time))
+    for sign in (1.0, -1.0):  # a message from before the wrap may come after it
+        turns[1:] += sign * (np.abs(steps + sign * _WRAP) < _WRAP_NEAR)
+    counted = np.cumsum(turns)
+    return time + _WRAP * counted, int(counted.max(initial=0.0))
+
+
+def _late(time: FloatArray, rows: Sequence[_Row], path: Path) -> int:
+    """How many messages came after one of a later time (N,) s. RecorderError where one is later
+    than datagrams come: the clock began anew there.
+    """
+    latest = np.maximum.accumulate(time)
+    ahead = np.diff(latest)
+    usual = float(np.median(ahead[ahead > 0.0])) if (ahead > 0.0).any() else 0.0
+    back = np.flatnonzero(latest - time > _LATE * usual + 0.5 * _MS)
+    if len(back):
+        k = int(back[0])
+        raise RecorderError(
+            f"{path}: message {k + 1} of the robot (number {rows[k].number}): time is "
+            f"{time[k]:.12g} s, {latest[k]:.12g} s came before: messages come late by "
+            f"{_LATE} usual steps at most, so the clock began anew; a file holds one session"
+        )
+    return int(np.count_nonzero(time < latest))
 
 
 def _rows(content: bytes, path: Path) -> tuple[list[_Row], str, int, int]:
