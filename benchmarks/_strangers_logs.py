@@ -77,6 +77,8 @@ def bags(rng: np.random.Generator, folder: Path) -> Iterator[tuple[str, Path, np
     finger = [(t + 1, joint_state(("finger",), np.array([0.01]), t + 1)) for t in stamps]
     nobody = [(t + 1, joint_state((), np.zeros(0), t + 1)) for t in stamps[::7]]
     turned = [(t, joint_state(NAMES[::-1], row[::-1], t)) for t, row in zip(stamps, q, strict=True)]
+    names = (*NAMES[:5], "joint_b1")
+    others = [(t, joint_state(names, row, t)) for t, row in zip(stamps, q, strict=True)]
     files = {
         "plain": (whole, True),
         "shuffled": (shuffled, True),
@@ -86,7 +88,8 @@ def bags(rng: np.random.Generator, folder: Path) -> Iterator[tuple[str, Path, np
         "empty messages": ([*whole[:50], (stamps[50] + 1, b""), *whole[50:]], True),
         "foreign bytes": ([*whole[:50], (stamps[50] + 1, b"\0\1\0\0\xff\xff"), *whole[50:]], True),
         "every message twice": (sorted(whole + whole), True),
-        "order changes in the middle": (whole[:90] + turned[90:], False),
+        "order changes in the middle": (whole[:90] + turned[90:], True),
+        "other joints in the middle": (whole[:90] + others[90:], False),
         "big-endian": (
             [(t, joint_state(NAMES, r, t, kind=0)) for t, r in zip(stamps, q, strict=True)],
             False,

@@ -57,7 +57,32 @@ def test_what_has_no_joint_states_or_is_no_bag_is_refused(tmp_path: Path) -> Non
     text.write_text("time,joint_a1\n")
     with pytest.raises(RecorderError, match="can't be read as a bag"):
         read_traces(text, None, NAMES)
-    mixed = states(4)
-    mixed[2].name = ["joint_a2", "joint_a1"]
-    with pytest.raises(RecorderError, match="name other joints"):
-        read_traces(bag(tmp_path / "mixed.db3", mixed), None, NAMES)
+    for names, said in (
+        (["joint_a2", "joint_b"], "name other joints"),
+        (["joint_a1", "joint_a1"], "name other joints"),
+    ):
+        mixed = states(4)
+        mixed[2].name = names
+        with pytest.raises(RecorderError, match=said):
+            read_traces(bag(tmp_path / f"{names[1]}.db3", mixed), None, NAMES)
+    twice = states(4)
+    for each in twice:
+        each.name = ["joint_a1", "joint_a1"]
+    with pytest.raises(RecorderError, match="name a joint twice"):
+        read_traces(bag(tmp_path / "twice.db3", twice), None, NAMES)
+
+
+def test_joints_are_read_by_name_in_whichever_order(tmp_path: Path) -> None:
+    (plain,) = read_traces(bag(tmp_path / "plain.db3", states(20)), None, NAMES)
+    mixed = states(20)
+    for each in mixed[::2]:
+        each.name.reverse()
+        each.position.reverse()
+        each.effort.reverse()
+    mixed.insert(7, JointState(name=["finger"], position=[0.1]))
+    (trace,) = read_traces(bag(tmp_path / "mixed.db3", mixed), None, NAMES)
+    assert trace.time.tolist() == plain.time.tolist()
+    assert trace.columns.keys() == plain.columns.keys()
+    for name, values in plain.columns.items():
+        assert trace.columns[name].tolist() == values.tolist()
+    assert trace.problems == ("1 joint states of finger: left out",)

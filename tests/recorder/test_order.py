@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.writer import CompressionType, Writer
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
 from ir_recorder.analysis import analyse
@@ -188,3 +188,26 @@ def test_joint_states_of_a_gripper_or_of_nobody_are_left_out(
     assert any(f"1 messages of {said} are left out" in each for each in recording.problems)
     (trace, _) = read_traces(bag(other, tmp_path / "mixed.db3", definitions=False))
     assert len(trace.time) == len(messages) - 1
+
+
+def test_joint_states_are_read_by_name_in_whichever_order(demo_file: Path, tmp_path: Path) -> None:
+    raw = read_raw(demo_file)
+    messages = next(each for each in raw.channels if "joint_states" in each.topic).messages
+    turned = []
+    for data in messages[1::2]:
+        state = deserialize_message(data, JointState)
+        for values in (state.name, state.position, state.velocity, state.effort):
+            values.reverse()
+        turned.append(serialize_message(state))
+    mixed = list(messages)
+    mixed[1::2] = turned
+    other = changed(raw, "joint_states", tuple(mixed))
+    count = sum(len(channel.messages) for channel in other.channels)
+    read = read_recording(rewritten(other, tmp_path / "mixed.mcap", np.arange(count)))
+    plain = read_recording(demo_file)
+    assert read.joints is not None
+    assert plain.joints is not None
+    assert read.joints.names == plain.joints.names
+    for kind in ("position", "velocity", "effort"):
+        assert np.array_equal(getattr(read.joints, kind), getattr(plain.joints, kind))
+    assert read.problems == plain.problems

@@ -9,7 +9,7 @@ four bytes of the encapsulation header.
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -168,6 +168,35 @@ def joint_groups(columns: Columns) -> dict[tuple[str, ...], IntArray]:
         groups.setdefault(tuple(name for name in names if name), []).append(row)
     order = sorted(groups, key=lambda names: (-len(names), -len(groups[names])))
     return {names: np.array(groups[names], dtype=np.int64) for names in order}
+
+
+def one_robot(groups: Mapping[tuple[str, ...], IntArray]) -> list[tuple[str, ...]]:
+    """Of `joint_groups` those of the robot, which has most joints: its names in each order that
+    messages have them. Raises ReadError where messages name as many others, or one of them twice.
+    """
+    first = next(iter(groups), ())
+    most = [names for names in groups if len(names) == len(first)]
+    if not first or any(sorted(names) != sorted(first) for names in most):
+        raise ReadError("its joint states name other joints from message to message")
+    if len(set(first)) < len(first):
+        raise ReadError(f"its joint states name a joint twice: {', '.join(first)[:200]}")
+    return most
+
+
+def by_name(columns: Columns, names: Sequence[str], *paths: str) -> list[FloatArray]:
+    """Fields of joint states, each (N, n) in the order of `names`, in whichever order a message
+    names these joints; missing values are NaN. Raises ReadError for other joints.
+    """
+    fields = [columns.numbers(path, len(names)) for path in paths]
+    if all(columns.is_constant(f"name[{k}]") for k in range(len(names))):
+        return fields
+    for order, rows in joint_groups(columns).items():
+        if sorted(order) != sorted(names):
+            raise ReadError("its joint states name other joints from message to message")
+        places = [order.index(name) for name in names]
+        for values in fields:
+            values[rows] = values[np.ix_(rows, places)]
+    return fields
 
 
 def fitting(messages: Sequence[bytes], type_name: str, schema: str) -> list[int]:

@@ -17,7 +17,7 @@ from ir_msgs_py.plc import PlcInputs, PlcOutputs
 from ir_recorder.errors import ReadError
 from ir_recorder.format import contents
 from ir_recorder.reading.bag_file import read_bag_file
-from ir_recorder.reading.cdr import Columns, fitting, joint_groups
+from ir_recorder.reading.cdr import Columns, by_name, fitting, joint_groups, one_robot
 from ir_recorder.reading.limits import ReadLimits
 from ir_recorder.reading.mcap_file import RawChannel, RawRecording, chosen_namespace, read_raw
 from ir_recorder.reading.messages import contact_sentence, decoder_of, movement_from, savings_from
@@ -258,15 +258,17 @@ class _SeriesReader:
         groups = joint_groups(columns)
         if len(groups) < 2:
             return columns, channel
-        chosen, *others = groups
-        if any(len(each) == len(chosen) for each in others):
+        robot = one_robot(groups)
+        others = [each for each in groups if each not in robot]
+        if not others:
             return columns, channel
         for each in others:
             joints = ", ".join(each)[:200] or "no joint"
             self._problems.append(
                 f"{channel.topic}: {len(groups[each])} messages of {joints} are left out"
             )
-        return _taken(channel, groups[chosen].tolist())
+        rows = np.sort(np.concatenate([groups[each] for each in robot]))
+        return _taken(channel, rows.tolist())
 
     def _by_stamp(self, columns: Columns, channel: RawChannel) -> tuple[Columns, RawChannel]:
         """Messages that arrived in another order than they were made in, in that of their stamps;
@@ -304,18 +306,18 @@ class _SeriesReader:
         n = len(joint_names)
         if columns.lengths("position") != {n}:
             raise ReadError(f"not every message has the {n} positions of the first")
-        if not all(columns.is_constant(f"name[{k}]") for k in range(n)):
-            raise ReadError("its messages name different joints, or in another order")
-        if not np.isfinite(columns.numbers("position", n)).all():
+        fields = by_name(columns, joint_names, "position", "velocity", "effort")
+        position, velocity, effort = fields
+        if not np.isfinite(position).all():
             raise ReadError("a position is not a finite number")
         stamps = columns.stamps()
         return JointSeries(
             joint_names,
             stamps,
             self._seconds(stamps),
-            columns.numbers("position", n),
-            columns.numbers("velocity", n),
-            columns.numbers("effort", n),
+            position,
+            velocity,
+            effort,
         )
 
     def _power(self, columns: Columns, channel: RawChannel) -> PowerSeries:

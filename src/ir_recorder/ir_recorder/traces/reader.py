@@ -15,8 +15,8 @@ import numpy as np
 
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.names import JOINT_NAMES, POWER_STATE
-from ir_recorder.errors import RecorderError
-from ir_recorder.reading.cdr import Columns, fitting, joint_groups
+from ir_recorder.errors import ReadError, RecorderError
+from ir_recorder.reading.cdr import Columns, by_name, fitting, joint_groups, one_robot
 from ir_recorder.reading.reader import TYPES, read_recording
 from ir_recorder.reading.recording import JointSeries, PowerSeries, Recording
 from ir_recorder.traces.columns import TraceMapping, Wanted
@@ -34,7 +34,7 @@ from ir_recorder.traces.trace import (
     VELOCITY,
     Trace,
 )
-from ir_values.arrays import FloatArray, IntArray
+from ir_values.arrays import FloatArray
 from ir_values.errors import DescriptionError, InvalidValueError, listed
 from ir_values.extensions import Registry
 
@@ -75,24 +75,27 @@ def read_bag(path: Path) -> Trace:
         )
     columns = Columns([rows[k][1] for k in fit], JOINT_STATE, _SCHEMA)
     groups = joint_groups(columns)
-    names = _names(groups, path)
-    taken = [fit[k] for k in groups[names]]
+    try:
+        robot = one_robot(groups)
+    except ReadError as error:
+        raise RecorderError(f"{path}: {error}") from error
     problems = [
         f"{len(groups[each])} joint states of {', '.join(each)[:200] or 'no joint'}: left out"
         for each in groups
-        if each != names
+        if each not in robot
     ]
     if len(fit) < len(rows):
         problems.append(f"{len(rows) - len(fit)} messages are no {JOINT_STATE}: left out")
-    rows = [rows[k] for k in taken]
+    rows = [rows[fit[k]] for k in np.sort(np.concatenate([groups[each] for each in robot]))]
     columns = Columns([data for _, data in rows], JOINT_STATE, _SCHEMA)
     stamps = columns.stamps()
     nanoseconds = np.array([time for time, _ in rows]) if not stamps.any() else stamps
     time = (nanoseconds - nanoseconds[0]) * 1e-9
     kept = np.concatenate([[True], time[1:] > np.maximum.accumulate(time)[:-1]])
     found = {}
-    for field, ending in _FIELDS:
-        values = columns.numbers(field, len(names))
+    names = robot[0]
+    fields = by_name(columns, names, *(field for field, _ in _FIELDS))
+    for (_, ending), values in zip(_FIELDS, fields, strict=True):
         if np.isfinite(values).any():
             for k, name in enumerate(names):
                 found[f"{name}{ending}"] = values[kept, k].copy()
@@ -125,14 +128,6 @@ def _messages(bag: sqlite3.Connection, path: Path) -> list[tuple[int, bytes]]:
         raise RecorderError(f"{path}: has {count} joint states, at most {_MOST} are read")
     query = "SELECT timestamp, data FROM messages WHERE topic_id = ? ORDER BY timestamp, id"
     return [(int(time), bytes(data)) for time, data in bag.execute(query, (topic,))]
-
-
-def _names(groups: Mapping[tuple[str, ...], IntArray], path: Path) -> tuple[str, ...]:
-    """The joints of the robot: most joints are named by one kind of messages, in one order."""
-    first, *others = groups or ((),)
-    if not first or any(len(each) == len(first) for each in others):
-        raise RecorderError(f"{path}: its joint states name other joints from message to message")
-    return first
 
 
 # Traces of a recording: the joints' and the meter's, each with its own instants.
