@@ -18,7 +18,8 @@ from ir_cli.robot_from_urdf import RobotSource
 from ir_cli.robot_remarks import remarks_on
 from ir_cli.robot_shapes import Shapes, capsules_of
 from ir_cli.self_pairs import Pairs, kept_sentences
-from ir_description import load_cell, load_robot, robot_urdf
+from ir_description import InvalidValueError, load_cell, load_robot, robot_urdf
+from ir_description.files.making import estimated_sheet, urdf_arm
 from ir_description.library import robot_named
 from ir_description.robot import ReducedDistance
 from ir_kernels import Chain, DynamicsModel
@@ -196,6 +197,30 @@ def test_seven_axes_are_refused_with_their_names(
     arguments = ["--urdf", str(tmp_path / "robot.urdf"), "--drives", str(tmp_path / "drives.yaml")]
     assert main(["robot", "new", *arguments, "-o", str(tmp_path / "out.yaml")]) == 2
     assert "has 7 axes (shoulder_pan_joint, " in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_planned_axis_that_others_follow_turns_as_the_urdf_says_and_never_farther(
+    seed: int,
+) -> None:
+    """Limits become degrees and radians again, which rounds them."""
+    arm = urdf_arm(robot_urdf(load_robot("kr6_r900_2")), "arm.urdf")
+    draw = np.random.default_rng(seed)
+    for _ in range(20):
+        ends = np.stack([-draw.uniform(0.1, 6.3, 6), draw.uniform(0.1, 6.3, 6)])
+        joints = tuple(
+            replace(joint, lower=float(low), upper=float(high))
+            for joint, low, high in zip(arm.joints, *ends, strict=True)
+        )
+        led = replace(arm, joints=joints, leaders=frozenset(joint.name for joint in joints))
+        values = estimated_sheet("arm", "", 6.0, led).values
+        low, high = (
+            np.radians([float(f"{x:.11g}") for x in values[f"position_{end}_deg"].numbers])
+            for end in ("min", "max")
+        )
+        robot_from_urdf.check_leaders(led, low, high)
+        with pytest.raises(InvalidValueError, match=r"\(<mimic>\), and the URDF turns it from"):
+            robot_from_urdf.check_leaders(led, low, high + 1e-6 * np.eye(6)[draw.integers(6)])
 
 
 def test_torques_that_a_urdf_does_not_have_are_estimated_unless_the_sheet_has_them(

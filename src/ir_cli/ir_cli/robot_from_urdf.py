@@ -40,6 +40,8 @@ from ir_values.errors import RobotFileError
 from ir_values.output_files import write_file
 
 BYTES_MAX = 8_000_000
+ROUNDED = 1e-10
+"""Share by which a limit in a robot file, in degrees of eleven digits, may be off the URDF's."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,7 @@ def _made(source: RobotSource) -> MadeRobot:
     sheet = _sheet(source, arm)
     names = link_names(arm, sheet)
     low, high = (np.radians(sheet.values[f"position_{end}_deg"].numbers) for end in ("min", "max"))
-    _check_leaders(arm, low, high)
+    check_leaders(arm, low, high)
     given = sheet.values.get("machine_home_deg")
     home = None if given is None else np.asarray(np.radians(given.numbers), dtype=np.float64)
     shapes = capsules_of(arm, bodies, names, sheet.radii)
@@ -125,10 +127,14 @@ def _check_axes(arm: UrdfArm) -> None:
         raise InvalidValueError(f"{error}; its axes are {names}, see --tip") from error
 
 
-def _check_leaders(arm: UrdfArm, low: FloatArray, high: FloatArray) -> None:
+def check_leaders(arm: UrdfArm, low: FloatArray, high: FloatArray) -> None:
     """Raise InvalidValueError where joints turn farther than what follows them was swept."""
     for joint, lower, upper in zip(arm.joints, low, high, strict=True):
-        if joint.name in arm.leaders and (lower < joint.lower or upper > joint.upper):
+        beyond = max(
+            joint.lower - lower - ROUNDED * abs(joint.lower),
+            upper - joint.upper - ROUNDED * abs(joint.upper),
+        )
+        if joint.name in arm.leaders and beyond > 0.0:
             limits = [f"{np.degrees(each):g}" for each in (lower, upper, joint.lower, joint.upper)]
             raise InvalidValueError(
                 f"joint {joint.name} turns from {limits[0]} to {limits[1]} deg by the drive sheet, "

@@ -37,6 +37,12 @@ RATIO = 100.0
 ROTOR_SHARE = 1.0 / 3.0  # of the peak torque that the rotor alone takes at the acceleration limit
 FRICTION_SHARE = 0.08  # of the peak torque, each: Coulomb, and viscous at full speed
 COPPER_SHARE = 0.03  # of the peak power, lost in the windings at peak torque
+TURNS_MAX = 4.0
+"""Turns to either side of a limit in rad: cables let arms turn 1.5 at most, so more are degrees."""
+SPEED_MAX = 25.0
+"""Full speed of an axis [rad/s]: the fastest of public arms of six axes has 21 (1200 deg/s), and an
+axis of 30 deg/s is slow.
+"""
 # of full speed; torque there and at full speed, of the peak
 BEND = 0.62
 AT_BEND = 0.9
@@ -180,8 +186,10 @@ def _names(top: Table, key: str, count: int) -> tuple[str, ...]:
 
 def _complete(known: dict[str, Value], arm: UrdfArm, source: str) -> tuple[str, ...]:
     """Take from the URDF what it has, and estimate the rest; sentences on what it has and was not
-    taken. Raises RobotFileError for ranges that are none.
+    taken. Raises RobotFileError for ranges that are none, and for figures of the URDF in another
+    unit.
     """
+    _check_units(known, arm)
 
     def estimated(key: str, numbers: FloatArray, note: str) -> None:
         known.setdefault(key, Value(np.asarray(numbers), "estimate", "L", note))
@@ -248,6 +256,32 @@ def _complete(known: dict[str, Value], arm: UrdfArm, source: str) -> tuple[str, 
         "peak torque to 62 % of full speed, half of it at full speed",
     )
     return tuple(notes)
+
+
+def _check_units(known: Mapping[str, Value], arm: UrdfArm) -> None:
+    """Raise RobotFileError for limits and speeds of the URDF that are none of an arm, where the
+    sheet does not say them itself.
+    """
+    most = TURNS_MAX * 2.0 * np.pi
+    for joint in arm.joints:
+        limits = {"position_min_deg": joint.lower, "position_max_deg": joint.upper}
+        beyond = [limits[key] for key in limits if key not in known and abs(limits[key]) > most]
+        if beyond:
+            raise RobotFileError(
+                arm.source,
+                joint.line,
+                f"joint {joint.name} may turn to {beyond[0]:g} rad, must be within {most:.4g} rad "
+                f"({TURNS_MAX:g} turns): degrees? write rad, make it continuous without limits, or "
+                "give position_min_deg and position_max_deg in the drive sheet (--drives)",
+            )
+        if "velocity_deg_s" not in known and joint.velocity > SPEED_MAX:
+            raise RobotFileError(
+                arm.source,
+                joint.line,
+                f"joint {joint.name} turns at {joint.velocity:g} rad/s, must be at most "
+                f"{SPEED_MAX:g} rad/s: degrees? write rad/s, or give velocity_deg_s in the drive "
+                "sheet (--drives)",
+            )
 
 
 def _range(kind: str, lower: float, upper: float) -> tuple[float, float]:

@@ -97,7 +97,7 @@ class UrdfArm:
     3) in its own; flange (3, 3): the last frame in the base at q = 0. links: 7, in these frames.
     rounding [m]: by which right angles that were written with few digits move any point, at most.
     notes: what was read otherwise than it stands there, in words. leaders: names of planned joints
-    whose limits bound bodies that follow them.
+    whose limits bound bodies that follow them. source: the file, for people.
     """
 
     name: str
@@ -109,6 +109,7 @@ class UrdfArm:
     rounding: float = 0.0
     notes: tuple[str, ...] = ()
     leaders: frozenset[str] = frozenset()
+    source: str = ""
 
     @property
     def joint_origin(self) -> FloatArray:
@@ -174,6 +175,7 @@ def urdf_arm(text: str, source: str, tip: str = "", without: Collection[str] = (
         rounding if rounding > SAID else 0.0,
         tuple(notes),
         frozenset(gathering.leaders),
+        source,
     )
 
 
