@@ -10,7 +10,7 @@ import pytest
 
 from ir_description import InvalidValueError
 from ir_description.files.collada import triangles_from_collada
-from ir_description.files.making import Meshes, fitted, link_bodies, urdf_arm, with_masses
+from ir_description.files.making import Meshes, expanded, fitted, link_bodies, urdf_arm, with_masses
 from ir_values.arrays import FloatArray
 from ir_values.errors import RobotFileError
 
@@ -105,6 +105,33 @@ def test_what_does_not_matter_is_no_reason_to_refuse_a_file() -> None:
     macro = text.replace("</robot>", '<xacro:macro name="m"/></robot>')
     with pytest.raises(RobotFileError, match=r":1[0-9]: this is a xacro file"):
         urdf_arm(macro, "arm.urdf")
+
+
+def test_an_argument_that_a_xacro_file_does_not_have_is_refused_with_those_it_has(
+    tmp_path: Path,
+) -> None:
+    """What is declared, in a file that is included too, or asked for counts, with a default or
+    not.
+    """
+    pytest.importorskip("xacro")
+    name = 'xmlns:xacro="http://ros.org/wiki/xacro"'
+    (tmp_path / "more.xacro").write_text(
+        f'<robot {name}><xacro:arg name="part" default="a"/></robot>'
+    )
+    path = tmp_path / "arm.xacro"
+    path.write_text(
+        f'<robot {name} name="arm"><xacro:include filename="more.xacro"/>'
+        '<xacro:arg name="reach" default="1"/><xacro:arg name="unused" default="2"/>'
+        '<link name="$(arg part)_$(eval reach + 3)_$(arg tool)"/></robot>'
+    )
+    given = {"tool": "t", "reach": "2", "unused": "0", "part": "b"}
+    assert 'name="b_5_t"' in expanded(path, None, given)
+    said = "--set nope: it has no such argument, it has part, reach, tool, unused$"
+    with pytest.raises(InvalidValueError, match=said):
+        expanded(path, None, {"tool": "t", "nope": "1"})
+    path.write_text(f'<robot {name} name="arm"/>')
+    with pytest.raises(InvalidValueError, match=r"--set nope: .* it has none$"):
+        expanded(path, None, {"nope": "1"})
 
 
 SHAPES = {

@@ -15,7 +15,7 @@ from pathlib import Path
 from types import ModuleType
 
 from ir_description.files.making.link_bodies import Meshes
-from ir_values.errors import InvalidValueError, one_line
+from ir_values.errors import InvalidValueError, listed, one_line
 
 PROGRAM = f"from {__name__} import main; main()"
 SECONDS = 60
@@ -27,7 +27,7 @@ _UNSET = re.compile(r"Undefined substitution argument (\w+)")
 def expanded(path: Path, packages: Path | None, settings: Mapping[str, str]) -> str:
     """The URDF that a xacro file describes, its arguments by `settings`, else by their defaults;
     packages: a folder below which $(find NAME) looks beside those above the file. Raises
-    InvalidValueError.
+    InvalidValueError, also for a setting that the file never asks for.
     """
     if find_spec("xacro") is None:
         raise InvalidValueError(
@@ -48,6 +48,22 @@ def expanded(path: Path, packages: Path | None, settings: Mapping[str, str]) -> 
             said = f"its argument {unset[1]} has no default: give --set {unset[1]}:=VALUE"
         raise InvalidValueError(f"{path}: xacro can't expand it: {said}")
     return found.stdout.decode()
+
+
+class _Arguments(dict[str, str]):
+    """Arguments by name, and which of them were asked for."""
+
+    def __init__(self, settings: Mapping[str, str]) -> None:
+        super().__init__(settings)
+        self.asked = set[str]()
+
+    def __contains__(self, name: object) -> bool:
+        self.asked.add(str(name))
+        return super().__contains__(name)
+
+    def __getitem__(self, name: str) -> str:
+        self.asked.add(name)
+        return super().__getitem__(name)
 
 
 def main() -> None:
@@ -74,8 +90,12 @@ def main() -> None:
     sys.modules[_FINDS_FROM] = index
     import xacro
 
+    arguments = _Arguments(settings)
     try:
-        document = xacro.process_file(file, mappings=settings)
+        document = xacro.process_file(file, mappings=arguments)
     except Exception as error:  # of xacro and of the file's own expressions, of any kind
         sys.exit(f"{type(error).__name__}: {error}")
+    if unknown := settings.keys() - arguments.asked:
+        known = listed(sorted(arguments.keys() - unknown))
+        sys.exit(f"--set {min(unknown)[:40]}: it has no such argument, it has {known}")
     sys.stdout.write(document.toprettyxml(indent=" "))
