@@ -318,6 +318,10 @@ def test_late_messages_of_egm_are_counted_and_a_second_session_is_refused(tmp_pa
     trace = read(path)
     check(trace, 0.004)
     assert any(each.startswith("3 messages came late") for each in trace.problems)
+    mixed = np.random.default_rng(1).permutation(len(messages))
+    path.write_bytes(b"".join(messages[k] for k in mixed))
+    with pytest.raises(RecorderError, match="the clock began anew"):
+        read(path)
     again = [egm(k, row + 1.0, clock=False, begin=2) for k, row in enumerate(degrees())]
     path.write_bytes(b"".join([*messages, *(varint(len(each)) + each for each in again)]))
     last = 0.004 * (len(messages) - 1)

@@ -117,8 +117,8 @@ def _late(time: FloatArray, rows: Sequence[_Row], path: Path) -> int:
     than datagrams come: the clock began anew there.
     """
     latest = np.maximum.accumulate(time)
-    ahead = np.diff(latest)
-    usual = float(np.median(ahead[ahead > 0.0])) if (ahead > 0.0).any() else 0.0
+    steps = np.diff(np.unique(time))
+    usual = float(np.median(steps)) if len(steps) else 0.0
     back = np.flatnonzero(latest - time > _LATE * usual + 0.5 * _MS)
     if len(back):
         k = int(back[0])
