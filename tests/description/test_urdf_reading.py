@@ -10,7 +10,15 @@ import pytest
 
 from ir_description import InvalidValueError
 from ir_description.files.collada import triangles_from_collada
-from ir_description.files.making import Meshes, expanded, fitted, link_bodies, urdf_arm, with_masses
+from ir_description.files.making import (
+    Meshes,
+    expanded,
+    fitted,
+    link_bodies,
+    urdf_arm,
+    with_masses,
+    xml_text,
+)
 from ir_values.arrays import FloatArray
 from ir_values.errors import RobotFileError
 
@@ -49,6 +57,31 @@ def test_blank_lines_above_the_declaration_count_as_lines_alone(lines: int) -> N
     wrong = declared.replace('lower="-2.5"', 'lower="nan"', 1)
     with pytest.raises(RobotFileError, match=rf":{9 + lines}: lower of limit of joint j1"):
         urdf_arm(wrong, "arm.urdf")
+
+
+@pytest.mark.parametrize("encoding", ["ISO-8859-1", "windows-1252", "iso-8859-15", "utf-8", ""])
+def test_a_urdf_is_read_in_the_encoding_that_it_declares(encoding: str) -> None:
+    text = arm_text().replace('name="arm"', 'name="Kräftig"')
+    declared = f" encoding='{encoding}'" if encoding else ""
+    text = f'<?xml version="1.0"{declared}?>\n{text}'
+    assert xml_text(text.encode(encoding or "utf-8"), "arm.urdf") == text
+    assert urdf_arm(text, "arm.urdf").name == "Kräftig"
+
+
+@pytest.mark.parametrize(
+    ("encoding", "content", "said"),
+    [
+        ("shift_jis", "力".encode("shift_jis"), "declares the encoding 'shift_jis', which is not"),
+        ("rot13", b"\xe4", "declares the encoding 'rot13', which is not read: save it as UTF-8"),
+        ("windows-1252", b"\x81", "'windows-1252', where byte 0x81 is no character"),
+        ("iso-8859-99", b"\xe4", "'iso-8859-99', which is not read"),
+        ("utf-8", b"\xe4", "byte 0xe4 is not UTF-8 text"),
+    ],
+)
+def test_an_encoding_that_is_not_read_is_named(encoding: str, content: bytes, said: str) -> None:
+    text = f'<?xml version="1.0" encoding="{encoding}"?><robot name="'.encode() + content + b'"/>'
+    with pytest.raises(RobotFileError, match=said):
+        xml_text(text, "arm.urdf")
 
 
 HOSTILE = (

@@ -32,6 +32,7 @@ from ir_description.files.making import (
     urdf_arm,
     with_home,
     with_masses,
+    xml_text,
 )
 from ir_kernels import Chain, KernelError
 from ir_kernels.wrist_geometry import arm_lines
@@ -162,7 +163,9 @@ def _home(
 
 def _sheet(source: RobotSource, arm: UrdfArm) -> DriveSheet:
     if source.drives is not None:
-        return drive_sheet(_text(source.drives), str(source.drives), arm)
+        content = read_regular_file(source.drives, BYTES_MAX)
+        text = text_of(content, str(source.drives), RobotFileError)
+        return drive_sheet(text, str(source.drives), arm)
     if source.payload is None:
         raise InputError(
             f"{source.urdf}: a URDF does not say what the robot may carry: give --payload KG, or a "
@@ -176,7 +179,7 @@ def _sheet(source: RobotSource, arm: UrdfArm) -> DriveSheet:
 
 def urdf_text(source: RobotSource) -> str:
     """The URDF, expanded where it is a xacro file."""
-    text = _text(source.urdf)
+    text = xml_text(read_regular_file(source.urdf, BYTES_MAX), str(source.urdf))
     if source.urdf.suffix == ".xacro" or "<xacro:" in text:
         return expanded(source.urdf, source.packages, source.settings)
     if source.settings:
@@ -236,7 +239,3 @@ def _say(out: Path, made: MadeRobot) -> None:
         f"ir plan --robot {out}"
     )
     sys.stdout.write("\n".join(lines) + "\n")
-
-
-def _text(path: Path) -> str:
-    return text_of(read_regular_file(path, BYTES_MAX), str(path), RobotFileError)

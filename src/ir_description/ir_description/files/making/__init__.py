@@ -20,6 +20,7 @@ from ir_description.files.making.robot_text import (
     with_home,
 )
 from ir_description.files.making.urdf_arm import UrdfArm, urdf_arm
+from ir_description.files.making.urdf_tree import xml_text
 from ir_description.files.making.xacro_file import expanded
 
 __all__ = [
@@ -44,4 +45,5 @@ __all__ = [
     "with_home",
     "with_masses",
     "with_overhang",
+    "xml_text",
 ]

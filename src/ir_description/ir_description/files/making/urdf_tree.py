@@ -19,6 +19,7 @@ from ir_description.files.robot_file import inertia_matrix
 from ir_description.poses import rotation_from_abc
 from ir_values.arrays import FloatArray, number_of
 from ir_values.errors import RobotFileError, listed, shown
+from ir_values.files import is_utf16, text_of
 
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 _WITHOUT_AXIS = ("fixed", "floating")
@@ -118,6 +119,30 @@ _BLANK_ABOVE = re.compile(r"\A(\s+)<\?xml.*?\?>", re.DOTALL)
 """Blank lines above an XML declaration, which other readers of URDFs pass over."""
 
 
+_DECLARED = re.compile(rb"""\A\s*<\?xml[^>]*?\sencoding\s*=\s*["']([^"'>]{1,40})["']""")
+_EIGHT_BITS = re.compile(r"(?i)(iso[-_]8859[-_]\d+|latin-?1|windows-?125\d|cp125\d)")
+_UNICODE = re.compile("(?i)(utf-?8|us-ascii|ascii)")
+
+
+def xml_text(content: bytes, source: str) -> str:
+    """The text of an XML file in the encoding that it declares, UTF-8 where it declares none.
+    Raises RobotFileError for one that is not read.
+    """
+    found = _DECLARED.match(content)
+    declared = found[1].decode("ascii", "replace") if found else "UTF-8"
+    if content.isascii() or is_utf16(content) or _UNICODE.fullmatch(declared):
+        return text_of(content, source, RobotFileError)
+    fault = "which is not read: save it as UTF-8"
+    if _EIGHT_BITS.fullmatch(declared):
+        try:
+            return content.decode(declared)
+        except LookupError:
+            pass
+        except UnicodeDecodeError as error:
+            fault = f"where byte 0x{content[error.start]:02x} is no character"
+    raise RobotFileError(source, 1, f"the file declares the encoding {shown(declared)}, {fault}")
+
+
 def urdf_tree(text: str, source: str) -> UrdfTree:
     """Read a URDF. Raises RobotFileError with the line of what is wrong."""
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
@@ -157,7 +182,7 @@ class _Element(Xml.Element):
 def _parsed(text: str) -> Xml.Element:
     """The document; elements know their lines."""
     builder = Xml.TreeBuilder(element_factory=_Element)
-    parser = expat.ParserCreate()
+    parser = expat.ParserCreate("UTF-8")  # in place of what the file declares
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         element = builder.start(tag, attributes)
