@@ -140,7 +140,7 @@ def test_columns_of_a_wrist_that_are_exchanged_are_doubted_or_said_to_be_undecid
     assert f"the columns of {ROBOT.joint_names[3]} and {ROBOT.joint_names[4]} swapped" in said
 
 
-def test_a_zero_that_is_off_is_no_centre_of_mass() -> None:
+def test_a_zero_that_is_off_is_no_mass_of_the_robot() -> None:
     robot = load_robot("kr210_r2700_extra")
     model, prior = model_of(robot, centres=True)
     samples = moved(robot, 6)
@@ -151,7 +151,7 @@ def test_a_zero_that_is_off_is_no_centre_of_mass() -> None:
         estimate = Estimate([run], ["run"], model, prior, motors=True)
         said.append(" ".join(doubts(estimate, result(estimate, "x")).sentences))
     assert said[0] == ""
-    assert "centre_" in said[1]
+    assert "zeros and signs of the joints" in said[1]
 
 
 def test_power_with_the_wrong_sign_is_refused() -> None:
