@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ir_description.files.making.link_bodies import LinkBody, volume_of
+from ir_description.files.making.link_bodies import LinkBody, box_of, volume_of
 from ir_description.files.making.urdf_arm import ArmLink, UrdfArm
 from ir_kernels import Chain
 from ir_values.arrays import BoolArray, FloatArray, frozen_inertia
@@ -20,10 +20,15 @@ DENSITY = 1100.0
 """kg of an arm per m^3 of the hulls of its links, where nothing says its mass: castings are hollow,
 hulls are not.
 """
+_ALIKE = 3  # links of exactly the same mass are no chance
 AGREES = 0.1
 """Share by which masses of a URDF may miss the stated total and are still believed."""
 ROUNDING = 0.01
 """Share by which principal moments of few digits may miss the triangle inequality."""
+SLIGHT = 0.1
+"""Least radius of gyration of a link, as a share of that of a solid of its shape: castings are
+hollow, which makes it larger, and no arm has all its mass in the core of its links.
+"""
 _LEAST = 1e-3  # kg of a link without a body
 
 # Reach [m] and full speeds [deg/s] of the KR 210 R2700 extra: other arms move their flange as fast.
@@ -75,10 +80,15 @@ def with_masses(
     else:
         estimated = list(arm.links)
     links = []
-    for link, size in zip(estimated, sizes, strict=True):
+    for link, size, own_bodies in zip(estimated, sizes, bodies, strict=True):
         mended, note = _possible(link, size)
-        links.append(mended)
-        notes += [note] if note else []
+        if not note and own_bodies and not link.estimate:
+            mended, note = _of_its_size(link, size, own_bodies)
+        placed, far = _among(mended, own_bodies)
+        links.append(placed)
+        notes += [each for each in (note, far) if each]
+    if total is None:
+        notes += _placeholders(arm.links[1:])
     return replace(arm, links=tuple(links)), tuple(notes)
 
 
@@ -120,14 +130,14 @@ def _estimated(
 def _possible(link: ArmLink, size: tuple[float, FloatArray, FloatArray]) -> tuple[ArmLink, str]:
     """The link with an inertia that a body can have, and a sentence where it had none."""
     try:
-        frozen_inertia(link.inertia, link.name)
+        frozen_inertia(link.inertia, f"inertia of {link.place}")
     except InvalidValueError as error:
         moments, axes = np.linalg.eigh(0.5 * (link.inertia + link.inertia.T))
         missing = moments[2] - moments[0] - moments[1]
         if moments[0] > 0.0 and 0.0 < missing <= ROUNDING * moments[2]:
             raised = moments + np.array([0.5, 0.5, 0.0]) * missing * (1.0 + 1e-6)
             mended = axes @ np.diag(raised) @ axes.T
-            more = f"moments of {link.name} miss the triangle inequality by rounding: raised"
+            more = f"moments of {link.place} miss the triangle inequality by rounding: raised"
             return replace(link, inertia=0.5 * (mended + mended.T)), (
                 f"{more} from {moments[0]:.4g} and {moments[1]:.4g} kg m^2 by {0.5 * missing:.2g}"
             )
@@ -138,8 +148,60 @@ def _possible(link: ArmLink, size: tuple[float, FloatArray, FloatArray]) -> tupl
             ) from error
         solid = link.mass / volume * inertia
         source = "inertia of a solid of its shape"
-        return replace(link, inertia=solid, estimate=source), f"{error}: taken is the {source}"
+        return replace(link, inertia=solid, moments=source), f"{error}: taken is the {source}"
     return link, ""
+
+
+def _of_its_size(
+    link: ArmLink, size: tuple[float, FloatArray, FloatArray], bodies: Sequence[LinkBody]
+) -> tuple[ArmLink, str]:
+    """The link with an inertia that its bodies can have, and a sentence where it had none."""
+    volume, _, inertia = size
+    if not volume > 0.0:
+        return link, ""
+    solid = link.mass / volume * inertia
+    radius, own = (
+        float(np.sqrt(np.linalg.eigvalsh(each)[-1] / link.mass)) for each in (link.inertia, solid)
+    )
+    low, high = box_of(bodies)
+    most = float(np.linalg.norm(high - low))
+    if SLIGHT * own <= radius <= most:
+        return link, ""
+    source = "inertia of a solid of its shape"
+    return replace(link, inertia=solid, moments=source), (
+        f"{link.place}: its inertia has a radius of gyration of {radius:.3g} m, for bodies of its "
+        f"size it must be from {SLIGHT * own:.3g} to {most:.3g} m: taken is the {source}; correct "
+        "its <inertia> (kg m^2)"
+    )
+
+
+def _among(link: ArmLink, bodies: Sequence[LinkBody]) -> tuple[ArmLink, str]:
+    """The link, doubted where its centre of mass is farther from its bodies than these are large,
+    and a sentence on that.
+    """
+    if not bodies or not link.mass > 0.0:
+        return link, ""
+    low, high = box_of(bodies)
+    beside = float(np.linalg.norm(np.maximum(np.maximum(low - link.com, link.com - high), 0.0)))
+    across = float(np.linalg.norm(high - low))
+    if beside <= across:
+        return link, ""
+    return replace(link, doubted=True), (
+        f"{link.place}: its centre of mass is {beside:.3g} m beside its bodies, must be at most "
+        f"{across:.3g} m, as far as they reach: millimetres? it is taken as it stands and torques "
+        "follow from it; correct the <origin> of its <inertial> (m)"
+    )
+
+
+def _placeholders(links: Sequence[ArmLink]) -> list[str]:
+    """A sentence where all moving links weigh the same."""
+    given = [link for link in links if link.mass > 0.0]
+    if len(given) < _ALIKE or len({link.mass for link in given}) > 1:
+        return []
+    return [
+        f"{given[0].place} and all other moving links weigh {given[0].mass:.4g} kg, must differ in "
+        "an arm: a placeholder? it is taken as it stands; --mass KG says the arm's mass"
+    ]
 
 
 def holding_torques(arm: UrdfArm, q: FloatArray, payload: float) -> FloatArray:

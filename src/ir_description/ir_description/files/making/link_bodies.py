@@ -322,6 +322,12 @@ def volume_of(bodies: Sequence[LinkBody]) -> tuple[float, FloatArray, FloatArray
     return volume, centre, np.asarray(np.trace(central) * np.eye(3) - central)
 
 
+def box_of(bodies: Sequence[LinkBody]) -> tuple[FloatArray, FloatArray]:
+    """Least and largest coordinates (3,) [m] of bodies, of which there is one at least."""
+    points = np.concatenate([_outline(body) for body in bodies])
+    return points.min(axis=0), points.max(axis=0)
+
+
 def _outline(body: LinkBody) -> FloatArray:
     if body.exact is None:
         return body.triangles.reshape(-1, 3)

@@ -12,14 +12,14 @@ from importlib.resources import files
 import numpy as np
 
 from ir_description.files.making.estimates import WORTH, peak_torques, usual_speeds
-from ir_description.files.making.urdf_arm import AXES, UrdfArm
+from ir_description.files.making.urdf_arm import AXES, ArmLink, UrdfArm
 from ir_description.files.power_file import figure
 from ir_description.files.robot_file import FORMAT
 from ir_description.poses import abc_from_rotation
 from ir_description.robot import ReducedDistance
 from ir_description.shapes import Capsule
 from ir_values.arrays import FloatArray
-from ir_values.errors import RobotFileError
+from ir_values.errors import RobotFileError, listed
 from ir_values.yaml_items import Item, Table, read_items
 from ir_values.yaml_tree import Node, yaml_text
 
@@ -39,9 +39,9 @@ FRICTION_SHARE = 0.08  # of the peak torque, each: Coulomb, and viscous at full 
 COPPER_SHARE = 0.03  # of the peak power, lost in the windings at peak torque
 TURNS_MAX = 4.0
 """Turns to either side of a limit in rad: cables let arms turn 1.5 at most, so more are degrees."""
-SPEED_MAX = 25.0
-"""Full speed of an axis [rad/s]: the fastest of public arms of six axes has 21 (1200 deg/s), and an
-axis of 30 deg/s is slow.
+SPEED_MAX = 30.0
+"""Full speed of an axis [rad/s]: the fastest of public arms of six axes has 25 (1445 deg/s), and
+the slowest axes turn at more than 30 deg/s.
 """
 # of full speed; torque there and at full speed, of the peak
 BEND = 0.62
@@ -300,12 +300,20 @@ def _torques(known: Mapping[str, Value], arm: UrdfArm) -> tuple[Value, list[str]
         return Value(effort, "URDF", "M"), []
     notes = [
         f"effort of {joint.name} is {joint.effort:g} Nm in the URDF, holding arm and payload needs "
-        f"{need:.3g} Nm: {estimate:.3g} Nm are taken"
-        for joint, need, estimate, good in zip(arm.joints, held, peak, meant, strict=True)
+        f"{need:.3g} Nm: {estimate:.3g} Nm are taken{_with_doubts(arm.links[i + 1 :])}"
+        for i, (joint, need, estimate, good) in enumerate(
+            zip(arm.joints, held, peak, meant, strict=True)
+        )
         if joint.effort > 0.0 and not good
     ]
     note = "1.5 times what holds arm and payload where the URDF has none that can be meant"
     return Value(np.where(meant, effort, peak), "estimate", "L", note), notes
+
+
+def _with_doubts(links: Sequence[ArmLink]) -> str:
+    """What an estimate follows from that is doubted."""
+    names = [link.place for link in links if link.doubted]
+    return f", with the doubted centre of mass of {listed(names)} as it stands" if names else ""
 
 
 _DIGITS = 11  # significant ones: more than any figure has, fewer than rounding spoils
@@ -381,9 +389,11 @@ def _lines(
         entries = np.array([J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]])
         yield f"  - name: {name}"
         whence = ("estimate", "L", link.estimate) if link.estimate else ("URDF", "M")
+        of_com = ("URDF", "L", "far from all bodies of the link") if link.doubted else whence
+        of_inertia = ("estimate", "L", link.moments) if link.moments else whence
         yield f"    mass_kg: {_figure(Value(np.array(link.mass), *whence))}"
-        yield f"    com_m: {_figure(Value(link.com, *whence))}"
-        yield f"    inertia_kgm2: {_figure(Value(entries, *whence))}"
+        yield f"    com_m: {_figure(Value(link.com, *of_com))}"
+        yield f"    inertia_kgm2: {_figure(Value(entries, *of_inertia))}"
     yield from _written("counterbalance", sheet.counterbalance)
     yield "capsules:"
     for capsule in capsules:

@@ -80,7 +80,8 @@ class PlacedShape:
 class ArmLink:
     """A link with everything that belongs to it, in its frame: mass [kg] (0: the URDF gives none),
     com (3,) [m], inertia (3, 3) [kg m^2] about it; estimate: whence these are where not from the
-    URDF.
+    URDF, moments: whence the inertia alone is. line: of the link. doubted: whether com lies far
+    from all of its bodies.
     """
 
     name: str
@@ -89,6 +90,14 @@ class ArmLink:
     inertia: FloatArray
     shapes: tuple[PlacedShape, ...]
     estimate: str = ""
+    moments: str = ""
+    line: int = 0
+    doubted: bool = False
+
+    @property
+    def place(self) -> str:
+        """For people: which link it is."""
+        return f"link {self.name} (line {self.line})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +153,8 @@ def urdf_arm(text: str, source: str, tip: str = "", without: Collection[str] = (
     placed = _placed(tree.path(base), path)
     frames = _frames(path, moving, placed)
     planned = {joint.name for joint in (*tree.path(base), *path)}
-    gathering = _Gathering(tree, source, without, planned)
+    _check_without(without, [base, *_chain(path)], tree, source)
+    gathering = _Gathering(tree, without, planned, source)
     links = []
     names = [base, *(joint.child for joint in moving)]
     for name, group, frame in zip(names, _groups(path, tree.path(base)), frames, strict=True):
@@ -212,6 +222,30 @@ def _axes(path: Sequence[UrdfJoint], source: str) -> list[UrdfJoint]:
                 "must be below upper",
             )
     return moving
+
+
+def _chain(path: Sequence[UrdfJoint]) -> list[str]:
+    """Names of the links behind the joints of a path up to its last axis."""
+    last = max(k for k, joint in enumerate(path) if joint.kind != "fixed")
+    return [joint.child for joint in path[: last + 1]]
+
+
+def _check_without(
+    without: Collection[str], chain: Collection[str], tree: UrdfTree, source: str
+) -> None:
+    """Raise RobotFileError for links to leave out that are none, or of the arm itself."""
+    for name in without:
+        if name not in tree.links:
+            raise RobotFileError(
+                source, 0, f"link {shown(name)} is unknown; known are {listed(tree.links)}"
+            )
+        if name in chain:
+            raise RobotFileError(
+                source,
+                tree.links[name].line,
+                f"link {name} is part of the arm, whose clearance is proved with all its bodies: "
+                "--without leaves out only what the links from the base to the flange carry",
+            )
 
 
 def _tip(tree: UrdfTree, tip: str, source: str) -> str:
@@ -347,7 +381,7 @@ class _Gathering:
     """What belongs to each planned link; no body is left out but those of `without`."""
 
     def __init__(
-        self, tree: UrdfTree, source: str, without: Collection[str], planned: set[str]
+        self, tree: UrdfTree, without: Collection[str], planned: set[str], source: str
     ) -> None:
         self._tree = tree
         self._source = source
@@ -356,11 +390,6 @@ class _Gathering:
         self._joints = {joint.name: joint for joint in tree.above.values()}
         self.notes: list[str] = []
         self.leaders: set[str] = set()
-        for name in without:
-            if name not in tree.links:
-                raise RobotFileError(
-                    source, 0, f"link {shown(name)} is unknown; known are {listed(tree.links)}"
-                )
 
     def link(self, name: str, names: Sequence[str], poses: Sequence[FloatArray]) -> ArmLink:
         """The links `names` with everything beside the path that they carry, from their poses (4,
@@ -371,7 +400,7 @@ class _Gathering:
             for each, pose in zip(names, poses, strict=True)
             for part in self._carried(each)
         ]
-        return _joined(name, parts)
+        return replace(_joined(name, parts), line=self._tree.links[name].line)
 
     def _carried(self, name: str) -> Iterator[_Part]:
         """A link, and what it carries beside the path, in its frame."""
@@ -418,15 +447,18 @@ class _Gathering:
         kind = "prismatic" if joint.kind == "prismatic" else "revolute"
         return SideMotion(joint.name, joint.child, kind, joint.pose, joint.axis, lower, upper)
 
-    def _range(self, joint: UrdfJoint, depth: int = 0) -> tuple[float, float]:
-        """From where to where a joint moves: by its limits, and as what it follows does."""
+    def _range(self, joint: UrdfJoint, behind: frozenset[str] = frozenset()) -> tuple[float, float]:
+        """From where to where a joint moves: by its limits, and as what it follows does; behind:
+        joints that follow it.
+        """
         own = (joint.lower, joint.upper)
+        behind |= {joint.name}
         leader = self._joints.get(joint.mimic)
-        if leader is None or depth > len(self._joints):
+        if leader is None or leader.name in behind:
             return own
         if leader.name in self._planned and leader.lower < leader.upper:
             self.leaders.add(leader.name)
-        lower, upper = self._range(leader, depth + 1)
+        lower, upper = self._range(leader, behind)
         ends = [joint.multiplier * each + joint.offset for each in (lower, upper)]
         if joint.lower < joint.upper:
             ends += own
@@ -435,7 +467,8 @@ class _Gathering:
     def _below(self, name: str) -> Iterator[UrdfLink]:
         yield self._tree.links[name]
         for joint in self._tree.below(name):
-            yield from self._below(joint.child)
+            if joint.name not in self._planned:
+                yield from self._below(joint.child)
 
 
 def _moved(part: _Part, pose: FloatArray) -> _Part:

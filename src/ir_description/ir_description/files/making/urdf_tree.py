@@ -232,6 +232,7 @@ class _Reader:
             joints[joint.name] = joint
             above[joint.child] = joint
         _check_tree(root, links, above)
+        self._notes += _led_by_none(joints)
         name = root.get("name") or "robot"
         return UrdfTree(name, links, above, tuple(self._notes), urdf_transmissions(root))
 
@@ -257,6 +258,13 @@ class _Reader:
             _number(inertia, key, f"inertia of link {name}", "0") if inertia is not None else 0.0
             for key in keys
         ]
+        absent = [key for key in keys if inertia is not None and key not in inertia.attrib]
+        if absent:
+            self._notes.append(
+                f"the <inertia> of link {name} (line {getattr(inertia, 'line', 0)}) has no "
+                f"{listed(absent)}: 0 kg m^2 {'is' if len(absent) == 1 else 'are'} taken; write "
+                "all six"
+            )
         about = pose[:3, :3] @ inertia_matrix(entries) @ pose[:3, :3].T
         weight = _number(mass, "value", f"mass of link {name}") if mass is not None else 0.0
         if weight < 0.0 or weight > 1e5:
@@ -419,6 +427,26 @@ def _check_tree(
                 raise _UrdfError(root, f"link {name} carries itself: its joints form a ring")
             seen.add(at)
             at = above[at].parent
+
+
+def _led_by_none(joints: Mapping[str, UrdfJoint]) -> Iterator[str]:
+    """A sentence for each joint that follows none that leads."""
+    for joint in joints.values():
+        at = joint.mimic
+        seen = {joint.name}
+        while at in joints and at not in seen:
+            seen.add(at)
+            at = joints[at].mimic
+        if joint.mimic and joint.mimic not in joints:
+            fault = "which the file does not have"
+        elif at == joint.name:
+            fault = "and so itself"
+        else:
+            continue
+        yield (
+            f"joint {joint.name} (line {joint.line}) mimics {shown(joint.mimic)}, {fault}: it "
+            "moves within its own limits; correct its <mimic>"
+        )
 
 
 def _name(element: Xml.Element, what: str) -> str:
