@@ -124,7 +124,39 @@ def test_rows_said_twice_and_a_line_that_was_cut_are_left_out_with_a_sentence(
     assert trace.problems == (
         "line 7, the last one, was cut: left out",
         "2 rows repeat the one before: left out",
+        "values that are missing: 2 of joint_a1",
     )
+
+
+@pytest.mark.parametrize("ending", [".csv", ".parquet"])
+def test_columns_that_are_not_read_and_values_that_are_missing_are_said_once(
+    tmp_path: Path, ending: str
+) -> None:
+    """A second clock and set values among them, in plain and in makers' names."""
+    nan = float("nan")
+    logs = {
+        "plain": {"time": [0.0, 1, 2], "timestamp": [0.0, 2, 4], "joint_a1": [0.1, nan, nan]},
+        "made": {"timestamp": [0.0, 1, 2], "actual_q_0": [0.1, nan, nan], "target_q_0": [9.0] * 3},
+        "whole": {"time": [0.0, 1, 2], "joint_a1": [0.1, 0.2, 0.3]},
+    }
+    said = {}
+    for name, table in logs.items():
+        path = tmp_path / f"{name}{ending}"
+        if ending == ".csv":
+            rows = [
+                ",".join(table),
+                *(",".join(map(str, row)) for row in zip(*table.values(), strict=True)),
+            ]
+            path.write_text("\n".join([*rows, ""]))
+        else:
+            pyarrow = pytest.importorskip("pyarrow")
+            parquet = pytest.importorskip("pyarrow.parquet")
+            parquet.write_table(pyarrow.table(table), path)
+        said[name] = read_traces(path, joint_names=JOINTS[:1])[0].problems
+    missing = "values that are missing: 2 of joint_a1"
+    assert said["plain"] == ("columns that are not read: timestamp", missing)
+    assert said["made"][1:] == ("columns that are not read: target_q_0", missing)
+    assert said["whole"] == ()
 
 
 @settings(max_examples=20)

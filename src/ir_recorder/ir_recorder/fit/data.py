@@ -301,10 +301,13 @@ def _run(
     check_range(joints.source, cell.robot, positions)
     meter = _metered(traces)
     added = np.nan
-    notes = [*(problem for trace in traces for problem in trace.problems), *turned]
+    notes = [*_said(traces), *turned]
     if source.meter is not None:
         mapping = source.meter_mapping or TraceMapping()
-        outer = _metered(read_traces(source.meter, mapping, cell.robot.joint_names))
+        meters = read_traces(source.meter, mapping, cell.robot.joint_names)
+        if source.meter != source.motion:
+            notes += _said(meters)
+        outer = _metered(meters)
         if outer is None:
             raise RecorderError(
                 f"{source.meter}: there is neither a column power nor energy: head it power_W, "
@@ -335,6 +338,11 @@ def _run(
     if meter is not None and by != BY[1]:
         check_unit(samples.watts, cell.robot, meter.source)
     return samples, notes, added
+
+
+def _said(traces: Sequence[Trace]) -> list[str]:
+    """What reading said of each trace."""
+    return [f"{trace.source}: {problem}" for trace in traces for problem in trace.problems]
 
 
 def _gaps(joints: Trace) -> list[str]:

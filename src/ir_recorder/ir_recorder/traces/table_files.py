@@ -23,6 +23,7 @@ from ir_recorder.traces.columns import Column, TraceMapping, Wanted, chosen, mul
 from ir_recorder.traces.makers import MakersColumns, makers_columns
 from ir_recorder.traces.trace import LOAD, MODE, TIME, Trace
 from ir_values.arrays import BoolArray, FloatArray, IntArray, number_of
+from ir_values.errors import listed
 
 # Files of measurements as a user names them: regular ones of a bounded size.
 
@@ -184,7 +185,7 @@ class _TableReader:
             columns, note = self._maker.proved(columns, f"{self._path}:{self._begin}")
             self._problems.append(note)
         texts_of = MappingProxyType(spoken)
-        problems = tuple(self._problems)
+        problems = (*self._problems, *_not_read(self._headings, self._places), *_missing(columns))
         sampled = self._mapping.sampled
         return Trace(str(self._path), time, MappingProxyType(columns), texts_of, problems, sampled)
 
@@ -329,13 +330,33 @@ def table_trace(
         columns[TIME] = mapping.step * np.arange(len(table[headings[0]]), dtype=np.float64)
     time = columns.pop(TIME)
     columns = multiplied(columns, mapping)
-    notes: tuple[str, ...] = ()
+    notes: list[str] = []
     if maker is not None:
         columns, note = maker.proved(columns, str(path))
-        notes = (note,)
+        notes.append(note)
+    notes += [*_not_read(headings, places), *_missing(columns)]
     return Trace(
-        str(path), time, MappingProxyType(columns), problems=notes, sampled=mapping.sampled
+        str(path), time, MappingProxyType(columns), problems=tuple(notes), sampled=mapping.sampled
     )
+
+
+_NAMED = 8  # in a sentence
+
+
+def _not_read(headings: Sequence[str], places: Mapping[str, tuple[int, float]]) -> Iterator[str]:
+    """A sentence on the columns that are left out."""
+    read = {place for place, _ in places.values()}
+    others = [heading for k, heading in enumerate(headings) if heading and k not in read]
+    if others:
+        yield f"columns that are not read: {listed((each[:40] for each in others), _NAMED)}"
+
+
+def _missing(columns: Mapping[str, FloatArray]) -> Iterator[str]:
+    """A sentence on the values of columns, each (N,), that are missing."""
+    counts = {name: np.count_nonzero(np.isnan(values)) for name, values in columns.items()}
+    gone = [f"{count} of {name}" for name, count in counts.items() if count]
+    if gone:
+        yield f"values that are missing: {listed(gone, _NAMED)}"
 
 
 def _once(values: FloatArray, spoken: Mapping[str, Sequence[str]]) -> BoolArray:
@@ -387,12 +408,14 @@ def read_parquet(
         columns[TIME] = mapping.step * np.arange(len(table[0]), dtype=np.float64)
     time = columns.pop(TIME)
     columns = multiplied(columns, mapping)
-    notes: tuple[str, ...] = ()
+    notes: list[str] = []
     if maker is not None:
         columns, note = maker.proved(columns, str(path))
-        notes = (note,)
+        notes.append(note)
+    notes += [*_not_read(headings, places), *_missing(columns)]
+    said = tuple(notes)
     return Trace(
-        str(path), time, MappingProxyType(columns), MappingProxyType(texts), notes, mapping.sampled
+        str(path), time, MappingProxyType(columns), MappingProxyType(texts), said, mapping.sampled
     )
 
 
