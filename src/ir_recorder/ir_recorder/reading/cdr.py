@@ -195,7 +195,7 @@ def by_name(columns: Columns, names: Sequence[str], *paths: str) -> list[FloatAr
             raise ReadError("its joint states name other joints from message to message")
         places = [order.index(name) for name in names]
         for values in fields:
-            values[rows] = values[np.ix_(rows, places)]
+            values[rows] = values[rows][:, places]
     return fields
 
 
