@@ -240,6 +240,16 @@ def test_torques_that_a_urdf_does_not_have_are_estimated_unless_the_sheet_has_th
     assert robot_named(out).marks["drives.gear_peak_torque_nm"] == "M"
 
 
+def test_a_check_of_a_urdf_says_what_is_doubted_in_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    urdf = re.sub(r'<mass value="[^"]*"', '<mass value="1"', robot_urdf(load_robot("kr6_r900_2")))
+    urdf = re.sub(r"(<collision.*?</collision>\s*)+", SMALL, urdf, flags=re.DOTALL)
+    (tmp_path / "robot.urdf").write_text(urdf)
+    assert main(["robot", "check", str(tmp_path / "robot.urdf"), "--payload", "6"]) == 0
+    assert "note: robot.urdf: link link_1 (line" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [

@@ -18,7 +18,7 @@ from ir_cli.output import (
     print_table,
     text,
 )
-from ir_cli.robot_remarks import remarks_on
+from ir_cli.robot_remarks import Remark, remarks_on
 from ir_description import (
     DescriptionFileError,
     RobotModel,
@@ -154,13 +154,16 @@ def run_check(arguments: argparse.Namespace) -> int:
     if file.suffix.lower() in URDFS:
         from ir_cli.robot_from_urdf import made_robot
 
-        robot: RobotModel | None = made_robot(_source(file, arguments)).robot
+        made = made_robot(_source(file, arguments))
+        robot: RobotModel | None = made.robot
+        read = [Remark("note", file.name, note) for note in made.notes]
     else:
+        read = []
         robot = _readable(arguments.robot)
     if robot is None:
         return 1
 
-    remarks = remarks_on(robot)
+    remarks = (*remarks_on(robot), *read)
     if arguments.json:
         print_json({"robot": robot.name, "remarks": [remark._asdict() for remark in remarks]})
     else:
