@@ -67,7 +67,8 @@ def main() -> int:
         file = write_report(analysis, findings(analysis), Path(folder) / "report.html")
         faults = [fault for shot in SHOTS for fault in _draw(browser, file, shot, asked.folder)]
         planner = Planner("demo", clock=lambda: 0.0)
-        found = before_after_common(planner, (), planner.cell.park)
+        start = planner.cell.posture(planner.cell.cycle_start())
+        found = before_after_common(planner, (), start)
         file = write_before_after(found, planner.cell, Path(folder) / "compare.html")
         faults += _draw(browser, file, COMPARED, asked.folder)
         with live_view(analysis, _instant(analysis)) as server:

@@ -25,7 +25,7 @@ from xml.etree import ElementTree
 ROOT = Path(__file__).resolve().parent.parent
 OUTPUT = ROOT / "out" / "tests"
 SYSTEM = "tests/system"
-MINUTES = 8  # on two quiet cores
+MINUTES = 9  # on two quiet cores
 WITH_VALUE = ("-k", "-m", "-n", "-p", "-W", "-o", "-c", "--dist", "--deselect", "--ignore")
 NOTHING_COLLECTED = 5  # pytest's exit code: the words may choose tests of one part only
 
