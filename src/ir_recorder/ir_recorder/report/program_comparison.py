@@ -245,7 +245,8 @@ def _alike(found: BeforeAfter, side: Side) -> bool:
     other = found.planned
     if side is other or not side.found or side.certified != other.certified:
         return False
-    own, planned = side.report, other.report
+    own = side.report
+    planned = other.report
     return (
         abs(own.energy - planned.energy) < _NEAR * planned.energy
         and abs(own.duration - planned.duration) < _NEAR * planned.duration

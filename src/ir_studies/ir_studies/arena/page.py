@@ -461,27 +461,25 @@ def _tiles(ranking: _Ranking) -> list[Tile]:
                 f"next: {after.planner}, {after.solved}" if after is not None else "all alike",
             ),
         ),
-        Tile(
+        _first(
             f"least cost, {among}",
-            best[0].planner,
-            (
-                f"{percent(best[0].cost_ratio - 1.0)} against the best known, median",
-                f"next: {best[1].planner}, {percent(best[1].cost_ratio - 1.0)}"
-                if len(best) > 1
-                else "",
-            ),
+            best,
+            lambda one: percent(one.cost_ratio - 1.0),
+            " against the best known, median",
         ),
-        Tile(
+        _first(
             f"soonest first answer, {among}",
-            soonest[0].planner,
-            (
-                f"{milliseconds(soonest[0].first)}, median",
-                f"next: {soonest[1].planner}, {milliseconds(soonest[1].first)}"
-                if len(soonest) > 1
-                else "",
-            ),
+            soonest,
+            lambda one: milliseconds(one.first),
+            ", median",
         ),
     ]
+
+
+def _first(head: str, ranked: Sequence[Figures], figure: Callable[[Figures], str], of: str) -> Tile:
+    """The first of some planners with its figure, and the next."""
+    after = f"next: {ranked[1].planner}, {figure(ranked[1])}" if len(ranked) > 1 else ""
+    return Tile(head, ranked[0].planner, (f"{figure(ranked[0])}{of}", after))
 
 
 def _names(found: Sequence[Figures]) -> str:

@@ -642,7 +642,8 @@ def _moved_plan(finals: Sequence[Sequence[Final]], settings: LayoutSettings, cel
     for owner in dict.fromkeys(v.owner for v in settings.variables):
         if owner != "base" and not owner.startswith(_MACHINE):
             continue
-        start, end = place_of(owner, cell), place_of(owner, star)
+        start = place_of(owner, cell)
+        end = place_of(owner, star)
         along = float(np.hypot(*(end - start)))
         up = values.get(f"{owner}.z", 0.0)
         said = [f"{100.0 * along:.0f} cm"] if along >= _LEAST_MOVE else []

@@ -434,7 +434,8 @@ def _predicted(found: Findings) -> tuple[str, str]:
         f"{each.count} movements."
     )
     if abs(each.mean.value) < ALIKE:
-        result, words = "Predicted energies are right", "Their sum."
+        result = "Predicted energies are right"
+        words = "Their sum."
     elif math.isfinite(each.mean.low) and not each.outside:
         words = f"Their sum: {result.lower()}, which may be chance."
         result = "Predicted energies are not shown to be off"
