@@ -1,11 +1,14 @@
 """Run tests again and again beside busy processes, and print a line for each run.
 
-    python tools/under_load.py [--busy 8] [--runs 10] [what pytest takes]
+    python tools/under_load.py [--busy 8] [--runs 10] [--at-once 1] [what pytest takes]
 
-Without further words the tests of real nodes are run, tests/nodes and tests/system, one after
-another. A line says how many tests passed, failed and were repeated, the seconds, and the machine's
-load average at the end of the run; the names of failed tests follow it. The output of each run is
-in out/under_load. The exit code is 1 where any run failed.
+Without further words the tests of real nodes are run, tests/nodes and tests/system. A line says how
+many tests passed, failed and were repeated, the seconds, and the machine's load average at the end
+of the run; the names of failed tests follow it. The output of each run is in out/under_load. The
+exit code is 1 where any run failed.
+
+Runs at once are each other's load, and leave the processor to tests instead of busy processes:
+fifty runs, ten at once, take about an hour and a half on two cores.
 
 The busy processes are ended by their ids; they also end by themselves when this process dies.
 """
@@ -20,9 +23,9 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO
 
 ROOT = Path(__file__).resolve().parent.parent
 TESTS = ("-m", "not long", "tests/nodes", "tests/system")
@@ -52,16 +55,53 @@ def load(processes: int) -> Iterator[None]:
             process.wait()
 
 
-def run_to_the_end(command: list[str], output: IO[str]) -> int:
-    """Run a command in a process group of its own, which ends with it; its exit code."""
-    process = subprocess.Popen(
-        command, cwd=ROOT, stdout=output, stderr=subprocess.STDOUT, start_new_session=True
-    )
-    try:
-        return process.wait()
-    finally:
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
+class Runs:
+    """Runs of the tests, each in a process group of its own, which ends with it or with all."""
+
+    def __init__(self, command: list[str]) -> None:
+        self._command = command
+        self._running: set[subprocess.Popen[bytes]] = set()
+
+    def __enter__(self) -> Runs:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for process in tuple(self._running):
+            _end_group(process)
+
+    def run(self, k: int) -> bool:
+        """Run the tests once and print their line; whether all passed."""
+        begun = time.monotonic()
+        log = OUTPUT / f"run_{k:03d}.log"
+        with log.open("w", encoding="utf-8") as output:
+            process = subprocess.Popen(
+                self._command,
+                cwd=ROOT,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
+            self._running.add(process)
+            code = process.wait()
+            _end_group(process)
+            self._running.discard(process)
+        said = log.read_text(encoding="utf-8", errors="replace")
+        passed, failed, errors, reruns, skipped = counts_of(said).values()
+        lines = [
+            f"{k:3d}  {passed:6d}  {failed:6d}  {errors:6d}  {reruns:6d}  {skipped:7d}"
+            f"  {time.monotonic() - begun:7.0f}  {os.getloadavg()[0]:5.1f}"
+        ]
+        lines += [
+            f"     {line[:160]}" for line in re.findall(r"^(?:FAILED|ERROR) .*", said, re.MULTILINE)
+        ]
+        print("\n".join(lines), flush=True)
+        return code == 0
+
+
+def _end_group(process: subprocess.Popen[bytes]) -> None:
+    """End a run and all that it started."""
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
 
 
 def counts_of(output: str) -> dict[str, int]:
@@ -78,32 +118,26 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--busy", type=int, default=8, help="busy processes (default: %(default)s)")
     parser.add_argument("--runs", type=int, default=10, help="runs (default: %(default)s)")
+    parser.add_argument(
+        "--at-once", type=int, default=1, help="runs at once (default: %(default)s)"
+    )
     given, chosen = parser.parse_known_args()
     command = [sys.executable, "-m", "pytest", "-q", "-rfE", *(chosen or TESTS)]
     OUTPUT.mkdir(parents=True, exist_ok=True)
-    failures = 0
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    print(f"{' '.join(command[1:])}, beside {given.busy} busy processes on {os.cpu_count()} cores")
+    print(
+        f"{' '.join(command[1:])}, {given.at_once} at once beside {given.busy} busy processes on "
+        f"{os.cpu_count()} cores"
+    )
     print("run  passed  failed  errors  reruns  skipped  seconds   load", flush=True)
-    with load(given.busy):
-        for k in range(1, given.runs + 1):
-            begun = time.monotonic()
-            log = OUTPUT / f"run_{k:03d}.log"
-            with log.open("w", encoding="utf-8") as output:
-                code = run_to_the_end(command, output)
-            seconds = time.monotonic() - begun
-            said = log.read_text(encoding="utf-8", errors="replace")
-            passed, failed, errors, reruns, skipped = counts_of(said).values()
-            print(
-                f"{k:3d}  {passed:6d}  {failed:6d}  {errors:6d}  {reruns:6d}  {skipped:7d}"
-                f"  {seconds:7.0f}  {os.getloadavg()[0]:5.1f}"
-            )
-            for line in re.findall(r"^(?:FAILED|ERROR) .*", said, re.MULTILINE):
-                print(f"     {line[:160]}")
-            sys.stdout.flush()
-            failures += code != 0
-    print(f"{given.runs - failures} of {given.runs} runs green")
-    return int(failures > 0)
+    with load(given.busy), ThreadPoolExecutor(given.at_once) as threads, Runs(command) as runs:
+        asked = [threads.submit(runs.run, k) for k in range(1, given.runs + 1)]
+        try:
+            green = sum(run.result() for run in asked)
+        finally:
+            threads.shutdown(wait=False, cancel_futures=True)
+    print(f"{green} of {given.runs} runs green")
+    return int(green < given.runs)
 
 
 if __name__ == "__main__":
