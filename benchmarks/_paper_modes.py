@@ -10,7 +10,7 @@ from _paper_result import CALIBRATED, Experiment, Row, Statement, finished, pane
 
 from ir_description import load_cell, load_power_data
 from ir_msgs_py.names import NO_LOAD
-from ir_planner.program.pauses import mode_watts
+from ir_planner.program.rests import mode_watts
 from ir_planner.scene import load_text, scene_with
 
 CELL = "open"

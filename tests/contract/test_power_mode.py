@@ -13,7 +13,7 @@ from ir_msgs.msg import PowerMode
 from ir_msgs_py.modes import MODES, RESTS, Mode, ModeRow, TransitionTimes
 from ir_msgs_py.plc import PlcInputs
 from ir_planner import Planner
-from ir_planner.program.pauses import mode_watts
+from ir_planner.program.rests import mode_watts
 from ir_planner.scene.planning_scene import load_text, scene_with
 from ir_recorder.analysis.predicted_power import resting_watts
 from ir_recorder.report.picture import MODE_COLOURS

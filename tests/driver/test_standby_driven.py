@@ -15,8 +15,9 @@ import pytest
 from ir_description import load_cell, load_power_data
 from ir_msgs_py.modes import Mode, TransitionTimes
 from ir_msgs_py.names import NO_LOAD
-from ir_planner.program.pauses import RestStep, rests_at
-from ir_planner.program.standby import advice, lengths_of, plan_standby
+from ir_planner.program.pause_lengths import lengths_of
+from ir_planner.program.rests import RestStep, rests_at
+from ir_planner.program.standby import plan_standby
 from ir_planner.scene import scene_with
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.controller.simulation import Simulation, make_simulation
@@ -112,7 +113,7 @@ def test_a_policy_costs_what_was_planned_whenever_the_pause_ends(seed: int) -> N
     """
     case = Case(seed)
     samples = np.round(10.0 ** case.rng.uniform(-0.5, 2.6, 12), 2)
-    planned = advice(lengths_of(0.0, samples), case.q, case.scene, case.times)
+    planned = plan_standby(lengths_of(0.0, samples), case.q, case.scene, case.times)
     rests = rests_at(case.q, case.scene, case.times)
     steps = tuple(
         RestStep(rests.named(mode), at)
@@ -186,7 +187,7 @@ def test_charging_the_dc_link_again_costs_what_was_planned_and_nothing_is_lost(
         assert read.energy == pytest.approx(sum(parts) + stored, rel=1e-12)
         assert read.capacitor_energy == 0.0
         rests = rests_at(plant.backend.q, scene_with(CELL, NO_LOAD, power), TransitionTimes())
-        leave = rests.named(mode).leave
+        leave = rests.named(mode).times.leave
         cases[discharge] = energy, rests.in_time((rests.named(mode),), wake_at + leave)
     driven, planned = np.subtract(cases[POWER.dc_link.discharge], cases[None])
     assert driven == pytest.approx(planned, rel=0.01, abs=0.2)

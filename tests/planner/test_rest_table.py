@@ -20,7 +20,8 @@ from ir_description.robot import RestRow, RestTable
 from ir_msgs_py.modes import Mode, TransitionTimes
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Planner
-from ir_planner.program.standby import break_even, mode_watts, pause_energy, plan_standby
+from ir_planner.program.rests import mode_watts, rests_at
+from ir_planner.program.standby import break_even, plan_standby
 from ir_planner.scene.planning_scene import load_text, scene_with
 from ir_recorder.analysis.predicted_power import resting_watts
 from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
@@ -130,7 +131,8 @@ def test_break_even_is_where_two_modes_cost_the_same(table: RestTable, angles: l
         pause = break_even(deeper, q, scene, TIMES)
         if not np.isfinite(pause) or pause > 1e6:
             continue
-        both = [pause_energy(mode, pause, q, scene, TIMES) for mode in (shallower, deeper)]
+        rests = rests_at(q, scene, TIMES)
+        both = [rests.in_time((rests.named(mode),), pause) for mode in (shallower, deeper)]
         shortest = TIMES.enter(deeper) + TIMES.minimum_stay(deeper) + TIMES.leave(deeper)
         if pause > shortest:
             assert both[0] == pytest.approx(both[1], rel=1e-9)

@@ -14,17 +14,11 @@ from hypothesis import strategies as st
 from ir_description import load_cell, load_power_data
 from ir_msgs_py.modes import TransitionTimes
 from ir_planner.errors import RequestError
-from ir_planner.program.standby import (
-    Trip,
-    best_posture,
-    break_even,
-    late_start,
-    lengths_of,
-    mode_watts,
-    pause_energy,
-    plan_standby,
-)
+from ir_planner.program.pause_lengths import lengths_of
+from ir_planner.program.rests import mode_watts, rests_at
+from ir_planner.program.standby import break_even, plan_standby
 from ir_planner.scene.planning_scene import load_text, scene_with
+from ir_planner.waiting_postures import Trip, best_posture
 from ir_sim_driver.controller.settings import ControllerSettings, SimulationSettings
 from ir_sim_driver.controller.simulation import make_simulation
 
@@ -68,7 +62,7 @@ def test_no_mode_alone_costs_less_and_the_robot_is_ready_in_time(pause: float) -
     assert standby.modes[-1] == standby.chosen.name
     assert list(standby.switch_times) == sorted(standby.switch_times)
     assert standby.saving == pytest.approx(
-        pause_energy("STAND_ON_MOTORS", pause, HOME, SCENE, TIMES) - standby.energy
+        rests_at(HOME, SCENE, TIMES).cost((), pause)[0] - standby.energy
     )
     motors = mode_watts("STAND_ON_MOTORS", HOME, SCENE)
     assert standby.saving_on_motors == pytest.approx(motors * pause - standby.energy)
@@ -108,8 +102,8 @@ def test_a_pause_that_the_controller_is_left_to_costs_what_the_driver_measures(
         late += 0.01
     simulation.mains.settle()
     measured = simulation.mains.meter.reading().energy
-    assert late == pytest.approx(late_start(pause, SCENE, TIMES), abs=0.03)
-    planned = pause_energy("STAND_ON_MOTORS", pause, q, SCENE, TIMES)
+    planned, planned_late = rests_at(q, SCENE, TIMES).cost((), pause)
+    assert late == pytest.approx(planned_late, abs=0.03)
     assert planned == pytest.approx(measured, rel=0.03, abs=20.0)
 
 

@@ -14,10 +14,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_description import load_cell, load_power_data
-from ir_msgs_py.modes import TransitionTimes
+from ir_msgs_py.modes import RestTimes, TransitionTimes
 from ir_planner.errors import RequestError
-from ir_planner.program.pauses import Recharge, Rest, Rests, rests_at
-from ir_planner.program.standby import SAMPLES_MAX, Timeouts, advice, lengths_of, plan_standby
+from ir_planner.program.pause_lengths import SAMPLES_MAX, lengths_of
+from ir_planner.program.rests import Recharge, Rest, Rests, rests_at
+from ir_planner.program.standby import plan_standby
+from ir_planner.program.timeouts import Timeouts
 from ir_planner.scene.planning_scene import load_text, scene_with
 
 CELL = load_cell("demo")
@@ -50,16 +52,16 @@ def simulated(
             break
         energy += watts[mode] * (start - now)
         rest = rests.modes[k - 1]
-        energy += watts[mode] * rest.enter + watts[k] * rest.stay
-        now = start + rest.enter + rest.stay
+        energy += watts[mode] * rest.times.enter + watts[k] * rest.times.stay
+        now = start + rest.times.enter + rest.times.stay
         if rest.bus_off and cut is None:
-            cut = start + rest.enter
+            cut = start + rest.times.enter
         mode = k
     if cut is not None:  # a capacitor that is charged through a resistor takes twice what it holds
         share = math.exp(-rests.recharge.rate * (max(wake, now) - cut))
         energy += rests.recharge.whole * (1.0 - share)
     if mode:
-        leave = rests.modes[mode - 1].leave
+        leave = rests.modes[mode - 1].times.leave
         energy += watts[mode] * max(wake - now, 0.0) + watts[0] * leave
         now = max(wake, now) + leave
     energy += watts[0] * max(end - now, 0.0)
@@ -84,7 +86,7 @@ def _timed(
     first = 0.0
     if before:
         k, at = before[-1]
-        first = at + rests.modes[k].enter + rests.modes[k].stay
+        first = at + rests.modes[k].times.busy
     for at in [first, *(time for time in grid if time > first)]:
         yield from _timed(rests, chosen, grid, (*before, (chosen[len(before)], at)))
 
@@ -97,7 +99,7 @@ def controllers(draw: st.DrawFn, whole: float = 0.0) -> Rests:
     watts = sorted((draw(st.floats(5.0, 900.0)) for _ in range(4)), reverse=True)
     seconds = st.floats(0.0, 40.0)
     modes = tuple(
-        Rest(name, power, draw(seconds), draw(seconds), draw(seconds), name != NAMES[0])
+        Rest(name, power, RestTimes(draw(seconds), draw(seconds), draw(seconds)), name != NAMES[0])
         for name, power in zip(NAMES, watts[1:], strict=True)
     )
     timer = draw(st.floats(0.5, 60.0))
@@ -114,7 +116,7 @@ def test_no_sequence_with_timers_costs_less_than_the_planned_one(pause: float) -
     grid = [float(t) for t in np.linspace(0.0, min(pause, 300.0), 6)]
     least = np.inf
     for plan in plans(rests, grid):
-        for wake in (pause, *(pause - mode.leave for mode in rests.modes)):
+        for wake in (pause, *(pause - mode.times.leave for mode in rests.modes)):
             energy, ready = simulated(rests, plan, pause, wake)
             if wake > 0.0 and ready <= pause + 1e-9:
                 least = min(least, energy)
@@ -123,10 +125,10 @@ def test_no_sequence_with_timers_costs_less_than_the_planned_one(pause: float) -
 
 
 def test_the_shortest_pause_may_end_with_the_controllers_timer() -> None:
-    brakes = (5.0, 0.0, 1.0, 2.0)
-    deeper = (5.0, 0.0, 0.0, 1.0)
+    brakes = RestTimes(0.0, 1.0, 2.0)
+    deeper = RestTimes(0.0, 0.0, 1.0)
     modes = tuple(
-        Rest(name, *times) for name, times in zip(NAMES, (brakes, deeper, deeper), strict=True)
+        Rest(name, 5.0, times) for name, times in zip(NAMES, (brakes, deeper, deeper), strict=True)
     )
     rests = Rests(5.0, 1.0, modes)
     lengths = np.array([1.0, 2.0])
@@ -171,7 +173,7 @@ def test_more_information_never_costs_more(values: list[float], form: str) -> No
     given_ = np.sort(np.array(values))
     quantiles = form == "quantiles" and len(values) > 1
     lengths = lengths_of(0.0, NOT_GIVEN, given_) if quantiles else lengths_of(0.0, given_)
-    found = advice(lengths, HOME, SCENE, TIMES)
+    found = plan_standby(lengths, HOME, SCENE, TIMES)
     rounding = 1e-9 * found.expected
     assert found.clairvoyant <= found.expected + rounding
     assert found.expected <= min(found.energies) + rounding
@@ -190,8 +192,8 @@ def test_quantiles_are_what_many_samples_between_them_are() -> None:
     quantiles = np.array([5.0, 20.0, 60.0, 600.0])
     rng = np.random.default_rng(0)
     drawn = np.interp(rng.uniform(0.0, 3.0, 9000), np.arange(4.0), quantiles)
-    by_samples = advice(lengths_of(0.0, drawn), HOME, SCENE, TIMES)
-    by_quantiles = advice(lengths_of(0.0, NOT_GIVEN, quantiles), HOME, SCENE, TIMES)
+    by_samples = plan_standby(lengths_of(0.0, drawn), HOME, SCENE, TIMES)
+    by_quantiles = plan_standby(lengths_of(0.0, NOT_GIVEN, quantiles), HOME, SCENE, TIMES)
     assert by_quantiles.expected == pytest.approx(by_samples.expected, rel=0.03)
     assert by_quantiles.worst == pytest.approx(by_samples.worst, rel=0.03)
 

@@ -12,7 +12,7 @@ import pytest
 from ir_description import load_cell, load_power_data
 from ir_msgs_py.modes import TransitionTimes, drive_bus_up
 from ir_planner import Planner
-from ir_planner.program.pauses import rests_at
+from ir_planner.program.rests import rests_at
 from ir_recorder import Analysis, analyse
 from ir_recorder.analysis.analyse import unshortened_cycle
 from ir_recorder.analysis.predicted_power import BrakeTimer, pause_joules
@@ -72,7 +72,7 @@ def test_full_pauses_are_predicted_as_the_planner_predicts_them(seconds: float) 
     alone = BrakeTimer.of(data).joules(rests.motors, watts["STAND_ON_BRAKES"], seconds)
     assert alone == pytest.approx(rests.cost((), seconds)[0])
     for rest in rests.modes:
-        change = rest.enter + rest.leave
+        change = rest.times.enter + rest.times.leave
         planned = rests.in_time((rest,), seconds)
         if np.isfinite(planned):
             own = pause_joules(rest.watts, rests.motors, seconds, change)

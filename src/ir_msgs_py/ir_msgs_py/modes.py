@@ -7,6 +7,7 @@ and its watts and PROFIenergy number in the controller's data (ir_description).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from itertools import pairwise
@@ -130,6 +131,41 @@ def checked_mode(number: int) -> Mode:
         raise InvalidValueError(f"power mode is {number}: known are {known}") from error
 
 
+# How long a rest takes, alone and as the last of several.
+
+
+@dataclass(frozen=True)
+class RestTimes:
+    """Seconds of a mode to rest in: from asking for it until it is reached (enter), at least in it
+    (stay), and back to motors on (leave).
+    """
+
+    enter: float
+    stay: float
+    leave: float
+
+    @property
+    def busy(self) -> float:
+        """Seconds from asking for the mode until it can be left."""
+        return self.enter + self.stay
+
+    @property
+    def shortest(self) -> float:
+        """Shortest pause [s] that can be spent in the mode."""
+        return self.busy + self.leave
+
+    def wake_at(self, end: float) -> float:
+        """When the robot is woken from the mode to be ready at `end` [s]."""
+        return end - self.leave
+
+
+def shortest_pause(rests: Sequence[RestTimes]) -> float:
+    """Shortest pause [s] that can be spent in modes one after the other, each asked for as soon as
+    the one before can be left; 0 for none.
+    """
+    return sum(rest.busy for rest in rests) + rests[-1].leave if rests else 0.0
+
+
 # Cost of a power mode in the terms of PROFIenergy, and the reading of the mains meter.
 
 
@@ -173,6 +209,13 @@ class PowerMode:
             set_field(self, name, finite(getattr(self, name), f"{name} of {self.name}"))
         if np.isnan(self.break_even):
             raise InvalidValueError(f"break_even of {self.name} is nan: it must be a number")
+
+    @property
+    def times(self) -> RestTimes:
+        """Its times alone."""
+        return RestTimes(
+            self.time_to_pause, self.time_min_length_of_stay, self.regular_time_to_operate
+        )
 
 
 METER = (
@@ -274,14 +317,17 @@ class TransitionTimes:
     def _of(self, mode: str, what: str) -> float:
         return 0.0 if mode == "STAND_ON_MOTORS" else float(getattr(self, f"{mode.lower()}_{what}"))
 
+    def rest(self, mode: str) -> RestTimes:
+        """All three times of a mode."""
+        return RestTimes(self.enter(mode), self.minimum_stay(mode), self.leave(mode))
+
     def of(self, mode: Mode) -> PowerMode:
         """A mode to rest in with its times alone."""
+        rest = self.rest(mode.name)
         return PowerMode(
             mode=mode,
-            time_min_pause=self.enter(mode.name)
-            + self.minimum_stay(mode.name)
-            + self.leave(mode.name),
-            time_to_pause=self.enter(mode.name),
-            regular_time_to_operate=self.leave(mode.name),
-            time_min_length_of_stay=self.minimum_stay(mode.name),
+            time_min_pause=rest.shortest,
+            time_to_pause=rest.enter,
+            regular_time_to_operate=rest.leave,
+            time_min_length_of_stay=rest.stay,
         )

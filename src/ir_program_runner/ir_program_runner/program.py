@@ -12,7 +12,15 @@ from itertools import accumulate
 import numpy as np
 
 from ir_msgs_py.announcements import Event
-from ir_msgs_py.modes import READY, RESTS, Mode, PowerMode, TransitionTimes, modes_of
+from ir_msgs_py.modes import (
+    READY,
+    RESTS,
+    Mode,
+    RestTimes,
+    TransitionTimes,
+    modes_of,
+    shortest_pause,
+)
 from ir_msgs_py.names import END_REST, LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.report import MovementKind, PlannedMovement
@@ -196,9 +204,11 @@ class PauseRun:
             return self._difference(outcome.energy - begun.energy)
         asked = yield AskModes()
         known = {mode.mode: mode for mode in asked.modes}
-        times = [known.get(mode, self._times.of(mode)) for mode in self._modes]
-        shortest = sum(each.time_to_pause + each.time_min_length_of_stay for each in times)
-        shortest += times[-1].regular_time_to_operate
+        times = [
+            known[mode].times if mode in known else self._times.rest(mode.name)
+            for mode in self._modes
+        ]
+        shortest = shortest_pause(times)
         if self._duration + _ROUNDING < shortest:
             need((yield WaitUntil(end)))
             return (
@@ -233,15 +243,15 @@ class PauseRun:
         )
 
     def _rest(
-        self, end: float, times: Sequence[PowerMode]
+        self, end: float, times: Sequence[RestTimes]
     ) -> Generator[Request, RequestOutcome, str]:
         """Enter the modes one after the other and stay until it is time to wake."""
-        wake_at = end - times[-1].regular_time_to_operate
+        wake_at = times[-1].wake_at(end)
         stay = 0.0
         for mode, each in zip(self._modes, times, strict=True):
             yield Phase(f"pause: going to {mode.name}")
             outcome = yield from self._ask_for(mode)
-            enough = stay + each.time_to_pause + self._settings.enter_timeout
+            enough = stay + each.enter + self._settings.enter_timeout
             patience = min(enough, max(0.0, wake_at - outcome.now))
             outcome = yield WaitForMode((mode,), patience)
             if outcome.status.code == StatusCode.TIMED_OUT:
@@ -251,7 +261,7 @@ class PauseRun:
                 return note
             need(outcome)
             yield Phase(f"pause: {mode.name}")
-            stay = each.time_min_length_of_stay
+            stay = each.stay
         need((yield WaitUntil(wake_at)))
         return ""
 
@@ -268,11 +278,10 @@ class PauseRun:
             outcome = need((yield SetPlcInput(END_REST, True)))
         return outcome
 
-    def _wake(self, end: float, times: PowerMode) -> Requests:
+    def _wake(self, end: float, times: RestTimes) -> Requests:
         """Wake the robot and wait until it stands on motors; then no bit of the pause is left."""
         outcome = yield Phase("pause: waking")
-        change = times.time_to_pause + times.time_min_length_of_stay + times.regular_time_to_operate
-        limit = max(end, outcome.now + change) + self._settings.ready_timeout
+        limit = max(end, outcome.now + times.shortest) + self._settings.ready_timeout
         if self._mode is Mode.HIBERNATION:
             outcome = yield from self._wake_by_packets(outcome, limit)
         else:

@@ -540,7 +540,7 @@ def wait_modes(rests: Rests) -> tuple[WaitMode, ...]:
     modes = [WaitMode(MOTORS, 0.0, rests.timer, 0.0, rests.motors)]
     for sequence in rests.sequences:
         last = at_once(sequence)[-1]
-        shortest = last.free + last.rest.leave
+        shortest = last.free + last.rest.times.leave
         joules = rests.in_time(sequence, shortest) - last.rest.watts * shortest
         name = DEEPER.join(rest.name for rest in sequence)
         modes.append(WaitMode(name, shortest, _LONGEST_WAIT, joules, last.rest.watts))

@@ -7,18 +7,8 @@ from ir_planner.program.choice import Choice
 from ir_planner.program.more_work import chosen
 from ir_planner.program.movement_fronts import Ladder, TimeValues
 from ir_planner.program.movements import Movements
-from ir_planner.program.pauses import (
-    AUTO,
-    MOTORS,
-    Charge,
-    PlannedPause,
-    Rests,
-    Steps,
-    at_once,
-    rests_at,
-    spent,
-    switch_times,
-)
+from ir_planner.program.pause_lengths import PauseLengths, lengths_of
+from ir_planner.program.pauses import AUTO, Charge, PlannedPause, spent, switch_times
 from ir_planner.program.program import outlook, plan_program, prepared, program_of
 from ir_planner.program.request import (
     ProgramPlan,
@@ -28,16 +18,10 @@ from ir_planner.program.request import (
     nobody,
     unknown_searches,
 )
+from ir_planner.program.rests import MOTORS, Rests, Steps, at_once, rests_at
 from ir_planner.program.savings import common_program, savings_of
 from ir_planner.program.spreads import Spreads, with_intervals
-from ir_planner.program.standby import (
-    PauseLengths,
-    Standby,
-    Timeouts,
-    Trip,
-    best_posture,
-    lengths_of,
-)
+from ir_planner.program.standby import Standby, plan_standby
 from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, HopPart, StationChain
 from ir_planner.program.steps import (
     Doors,
@@ -51,6 +35,7 @@ from ir_planner.program.steps import (
     with_doors,
 )
 from ir_planner.program.stops import StopNode, station_nodes
+from ir_planner.program.timeouts import Timeouts
 
 __all__ = [
     "ACROSS",
@@ -81,9 +66,7 @@ __all__ = [
     "StopNode",
     "TimeValues",
     "Timeouts",
-    "Trip",
     "at_once",
-    "best_posture",
     "cheapest_chain",
     "chosen",
     "common_program",
@@ -95,6 +78,7 @@ __all__ = [
     "outlook",
     "placed_steps",
     "plan_program",
+    "plan_standby",
     "prepared",
     "program_of",
     "rests_at",

@@ -20,7 +20,7 @@ from ir_planner.program.choice import Choice, Steps
 from ir_planner.program.cycle_time import front_of
 from ir_planner.program.more_work import best_answer
 from ir_planner.program.movements import Movements
-from ir_planner.program.pauses import AUTO, MOTORS
+from ir_planner.program.pauses import AUTO
 from ir_planner.program.request import (
     ProgramPlan,
     ProgramRequest,
@@ -29,6 +29,7 @@ from ir_planner.program.request import (
     check_searches,
     nobody,
 )
+from ir_planner.program.rests import MOTORS
 from ir_planner.program.savings import held_against_common, named
 from ir_planner.program.spreads import Spreads
 from ir_planner.program.station_graph import HopPart, Settled, StationGraph
@@ -229,7 +230,7 @@ def _other_rests(steps: Steps, route: Route, request: ProgramRequest) -> list[st
             continue
         reason = "longer than the controller stands on motors"
         if mode != MOTORS:
-            needed = times.enter(mode) + times.minimum_stay(mode) + times.leave(mode)
+            needed = times.rest(mode).shortest
             reason = f"too short for {mode}, which takes {needed:g} s to enter, stay in and leave"
         remarks.append(
             f"a pause of {pause.dwell:g} s is {reason}: it is planned in {given.power_mode}"

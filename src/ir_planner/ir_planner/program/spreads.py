@@ -12,8 +12,8 @@ import numpy as np
 from ir_msgs_py.modes import modes_of
 from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_planner.checks import interval, movement_spread, spread
-from ir_planner.program.pauses import Rests, pause_slope, rests_at
 from ir_planner.program.request import ProgramPlan, ProgramRequest
+from ir_planner.program.rests import Rests, pause_slope, rests_at
 from ir_planner.scene import PlanningScene, scene_with
 from ir_values.arrays import FloatArray
 

@@ -1,294 +1,68 @@
-"""Standby: how a pause is spent best, known or uncertain in length, and at which posture."""
+"""Standby: the modes that a pause is spent in, their switch times, and when to wake.
+
+Of a pause of known length the modes are entered one after the other, each as soon as it can be, so
+that most of it is spent in the deepest, and the robot is woken in time. A pause whose end is not
+known has a timeout policy (timeouts), and its end wakes the robot, which is ready later then.
+"""
 
 from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ir_msgs_py.modes import REST_MODES, Mode, PowerMode, TransitionTimes, drive_bus_up
-from ir_msgs_py.status import StatusCode
 from ir_planner.checks import JouleInterval, interval, spread
-from ir_planner.errors import RequestError
 from ir_planner.presentation import plot_choices
-from ir_planner.program.pauses import (
+from ir_planner.program.pause_lengths import PauseLengths, lengths_of
+from ir_planner.program.rests import (
     BRAKES,
     MOTORS,
-    Rest,
     Rests,
     RestStep,
     Steps,
-    at_once,
     mode_watts,
-    over_by,
     pause_slope,
     recharge_of,
     rests_at,
     same_steps,
 )
+from ir_planner.program.timeouts import Timeouts
 from ir_planner.scene import PlanningScene
 from ir_values.arrays import FloatArray
 
-# How long a pause lasts: known, or as equally likely lengths, or as quantiles; checked at the
-# door.
-
-PAUSE_MAX = 604_800.0  # s: a week
-SAMPLES_MAX = 10_000  # planned in 40 ms of processor time
-# equally likely lengths that quantiles are taken as: the mean of a law with jumps to 0.1 %
-_BETWEEN = 1000
 _ROUNDS = 50  # of a break-even whose cost depends on it: far more than any needs
-
-_NONE: FloatArray = np.zeros(0)
-
-
-@dataclass(frozen=True, eq=False)
-class PauseLengths:
-    """likely (n,) [s]: equally likely lengths, sorted. most [s]: no pause is longer. known: there
-    is one only.
-    """
-
-    likely: FloatArray
-    most: float
-    known: bool = False
-
-    def less(self, seconds: float) -> "PauseLengths":
-        """What is left of each pause when `seconds` are taken from it; nothing is left of shorter
-        ones.
-        """
-        return PauseLengths(
-            np.maximum(self.likely - seconds, 0.0), max(self.most - seconds, 0.0), self.known
-        )
-
-    def extreme(self, switches: tuple[float, ...]) -> FloatArray:
-        """Lengths at which a policy with these switch times [s] may cost most: all that are likely,
-        the longest, and where lengths between the likely ones are possible, those just longer than
-        a switch.
-        """
-        if self.most == self.likely[-1]:
-            return self.likely
-        just = np.nextafter(np.array(switches), np.inf)
-        between = just[(just > self.likely[0]) & (just < self.most)]
-        return np.concatenate((self.likely, [self.most], between))
-
-
-def lengths_of(
-    pause: float, samples: FloatArray = _NONE, quantiles: FloatArray = _NONE
-) -> PauseLengths:
-    """Lengths of a request that gives one of the three: pause [s], samples (n,) or quantiles (n,)
-    [s]. Raises RequestError for what is no pause.
-    """
-    given = {"pause_samples": samples, "pause_quantiles": quantiles}
-    lists = [name for name, values in given.items() if len(values)]
-    if len(lists) + (pause != 0.0) > 1:
-        counts = [f"{name} ({len(given[name])} values)" for name in lists]
-        named = " and ".join([*([f"pause ({pause:g} s)"] if pause != 0.0 else []), *counts])
-        raise _refused(
-            f"{named} are given: exactly one of pause, pause_samples and pause_quantiles must be"
-        )
-    if not lists:
-        _check(pause, "pause")
-        return PauseLengths(np.array([pause]), pause, known=True)
-    (name,) = lists
-    values = given[name]
-    if len(values) > SAMPLES_MAX:
-        raise _refused(f"{name} has {len(values)} values: at most {SAMPLES_MAX} are taken")
-    for k, value in enumerate(values):
-        _check(float(value), f"{name}[{k}]")
-    if name == "pause_samples":
-        return PauseLengths(np.sort(values), float(values.max()))
-    return _between(values)
-
-
-def _between(quantiles: FloatArray) -> PauseLengths:
-    """Equally likely lengths between neighbouring quantiles."""
-    if len(quantiles) < 2:
-        raise _refused(
-            "pause_quantiles has 1 value: at least 2 are needed, those of the levels 0 and 1"
-        )
-    for k, (a, b) in enumerate(pairwise(quantiles)):
-        if b < a:
-            raise _refused(
-                f"pause_quantiles[{k + 1}] is {b:g} s: it must be at least the one before, {a:g} s"
-            )
-    parts = max(1, -(-_BETWEEN // (len(quantiles) - 1)))
-    share = (np.arange(parts) + 0.5) / parts
-    likely = quantiles[:-1, None] + share * np.diff(quantiles)[:, None]
-    return PauseLengths(likely.ravel(), float(quantiles[-1]))
-
-
-def _check(seconds: float, name: str) -> None:
-    if not (np.isfinite(seconds) and 0.0 < seconds <= PAUSE_MAX):
-        raise _refused(f"{name} is {seconds:g} s: it must be in (0, {PAUSE_MAX:g}] s")
-
-
-def _refused(sentence: str) -> RequestError:
-    return RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, sentence)
-
-
-# When to rest deeper in a pause whose end is not known: the timeout policy of least expected
-# energy.
-#
-# The lengths of the pause are given as equally likely samples. A policy is a sequence of modes with
-# switch times; the end of the pause wakes the robot, whatever mode it is in. The best switch times
-# are among few: the expected energy grows with a switch time between two samples (every pause that
-# reaches it stays longer in the mode that draws more, or is ready later), and drops only where a
-# sample is passed, because that pause ends before the switch. So a switch is at 0, at a sample (of
-# the pauses longer than that), at the controller's own timer, or at the moment when the mode before
-# can be left. Over these times the policy is found backwards, mode
-# by mode, by dynamic programming: exact, in n log n.
-#
-# But for what charges the DC link again, which depends on how long the drive bus was off: it is
-# counted as nothing and as a whole charge, and the better of both policies is taken, or one mode
-# alone: at most a whole charge (0.4 kJ) above the least expectation.
-
-
-@dataclass(frozen=True, eq=False)
-class Timeouts:
-    """Policies for the modes of `rests` and lengths (n,) [s], sorted; switched_off [J]: what
-    switching the drive bus off counts in the search.
-    """
-
-    rests: Rests
-    lengths: FloatArray
-    switched_off: float = 0.0
-
-    def best(self) -> Steps:
-        """The policy of least expected energy."""
-        steps = self._searched()
-        whole = self.rests.recharge.whole
-        if not whole:
-            return steps
-        other = replace(self, switched_off=whole)._searched()
-        alone = [at_once((rest,)) for rest in self.rests.modes]
-        policies = (steps, other, *alone, Steps())
-        return min(policies, key=lambda each: self.rests.mean_cost(each, self.lengths))
-
-    def _searched(self) -> Steps:
-        """The policy that the search finds."""
-        steps = self._first()
-        while steps and (following := self._next(steps[-1])) is not None:
-            steps = (*steps, following)
-        return steps
-
-    def _first(self) -> Steps:
-        """The first mode and its switch time; none: no pause outlasts standing on motors."""
-        rests = self.rests
-        lengths = self.lengths
-        times = np.concatenate(([0.0], lengths[over_by(rests.timer, lengths)]))
-        best = float("inf"), Steps()
-        if over_by(rests.timer, lengths[-1]):
-            best = self._until(np.array([lengths[-1]]), rests.motors, 0.0)[0], Steps()
-        for rest in rests.modes:
-            at = np.append(times, rests.timer) if rest.name == BRAKES else times
-            costs = self._until(at, rests.motors, 0.0) + self._from(at, rest, rests.motors, False)
-            k = int(np.argmin(costs))
-            if rest.watts <= rests.motors and costs[k] < best[0]:
-                best = float(costs[k]), (RestStep(rest, float(at[k])),)
-        return best[1]
-
-    def _next(self, step: RestStep) -> RestStep | None:
-        """The mode after a step and its switch time; None: it is the last."""
-        rest = step.rest
-        lengths = self.lengths
-        at = np.concatenate(([step.free], lengths[lengths >= step.free]))
-        least = self._until(lengths[-1:], rest.watts, rest.leave)[0]
-        best = None
-        for deeper in self._deeper(rest):
-            costs = self._until(at, rest.watts, rest.leave)
-            costs += self._from(at, deeper, rest.watts, rest.bus_off)
-            k = int(np.argmin(costs))
-            if self._going_on_after(at)[k] and costs[k] < least:
-                least = costs[k]
-                best = RestStep(deeper, float(at[k]))
-        return best
-
-    def _deeper(self, rest: Rest) -> tuple[Rest, ...]:
-        after = self.rests.modes[self.rests.modes.index(rest) + 1 :]
-        return tuple(each for each in after if each.watts <= rest.watts)
-
-    @cached_property
-    def _sums(self) -> FloatArray:
-        return np.concatenate(([0.0], np.cumsum(self.lengths)))
-
-    def _ended_by(self, times: FloatArray) -> FloatArray:
-        """How many pauses are over by each time, by the rule of `over_by`."""
-        return np.searchsorted(self.lengths, times, side="right").astype(np.float64)
-
-    def _going_on_after(self, times: FloatArray) -> FloatArray:
-        return len(self.lengths) - self._ended_by(times)
-
-    def _until(self, times: FloatArray, watts: float, leave: float) -> FloatArray:
-        """Energy of all pauses in one mode from time 0 until each of these times, and back to
-        motors of those that end before; differences of two times are the energy between them.
-        """
-        ended = self._ended_by(times)
-        lengths = self._sums[ended.astype(np.intp)]
-        staying = watts * (lengths + self._going_on_after(times) * times)
-        back: FloatArray = ended * (self.rests.motors * leave)
-        return staying + back
-
-    def _from(self, times: FloatArray, rest: Rest, watts: float, was_off: bool) -> FloatArray:
-        """Least energy, of all pauses that are longer, of entering a mode at each of these times
-        from one that draws `watts`, until the robot is ready; was_off: whether the drive bus is off
-        before.
-        """
-        longer = self._going_on_after(times)
-        free = times + rest.busy
-        switched = self.switched_off if rest.bus_off and not was_off else 0.0
-        entering = longer * (watts * rest.enter + rest.watts * rest.stay + switched)
-        early = (longer - self._going_on_after(free)) * (self.rests.motors * rest.leave)
-        return entering + early + self._after(free, rest)
-
-    def _after(self, free: FloatArray, rest: Rest) -> FloatArray:
-        """Least energy from each of the times on, from which a mode can be left, of all pauses that
-        are longer.
-        """
-        ends = self._onward(self.lengths, rest)
-        later = np.minimum.accumulate(ends[::-1])[::-1]
-        following = np.searchsorted(self.lengths, free, side="left")
-        at_samples = np.append(later, np.inf)[following]
-        best = np.minimum(at_samples, self._onward(free, rest)) - self._until(
-            free, rest.watts, rest.leave
-        )
-        return np.where(self._going_on_after(free) > 0, best, 0.0)
-
-    def _onward(self, times: FloatArray, rest: Rest) -> FloatArray:
-        """Energy in the mode from time 0 until each of these times, then deeper; the last: to the
-        end.
-        """
-        staying = self._until(times, rest.watts, rest.leave)
-        options = [
-            self._from(times, deeper, rest.watts, rest.bus_off) for deeper in self._deeper(rest)
-        ]
-        nobody = self._going_on_after(times) == 0
-        onward: FloatArray = np.min(options, axis=0) if options else np.full(len(times), np.inf)
-        return staying + np.where(nobody, 0.0, onward)
-
-
-# How a pause should be spent: a sequence of power modes with its switch times, and when to wake.
-#
-# Of a pause of known length the modes are entered one after the other, each as soon as it can be,
-# so that most of it is spent in the deepest, and the robot is woken in time. A pause whose end is
-# not known has a timeout policy (timeouts), and its end wakes the robot, which is ready later
-# then.
 
 
 @dataclass(frozen=True, eq=False)
 class Standby:
-    """The advice. energy [J]: over the pause, where its length is not known the mean over the
-    lengths.
+    """How to spend a pause, and what that takes.
 
-    chosen: the deepest mode that is asked for. wake_at [s] from the start of the pause, inf: its
-    end wakes the robot. saving [J]: against what the controller does by itself (`timer` s on
-    motors, then on brakes); saving_low, saving_high [J]: its 90 % interval. saving_on_motors [J]:
-    against standing on motors all the time. alternatives: all modes, shallow to deep, each alone
-    and at once, and their energies [J] (inf: the pause is too short); on motors with what the
-    controller does by itself. modes: the sequence, each asked for at its switch time [s]. expected,
-    worst, clairvoyant [J]: mean and largest energy, and the mean with each length known at the
-    start. late, latest [s]: mean and largest time from the end of the pause until the robot is
-    ready. posture: where to wait, "": where the robot stands; posture_energies [J]: at each of the
-    postures; trips: what moving there takes, in words; remark: what the modes' power rests on.
+    Energies are those of the whole pause, until the robot is ready; where its length is not known,
+    means over the lengths. Times count from the start of the pause.
+
+    chosen: the deepest mode that is asked for.
+    wake_at [s]: when the robot is woken; inf: the end of the pause wakes it.
+    energy [J]: what the pause takes.
+    saving [J]: against the controller alone, which stands on motors for `timer` and closes the
+        brakes then.
+    saving_on_motors [J]: against standing on motors all the time.
+    timer [s]: after which the controller closes the brakes by itself.
+    alternatives: all modes of the controller, shallow to deep.
+    energies [J]: of the pause in each alternative alone, asked for at once; on motors with what the
+        controller does by itself; inf: the pause is too short.
+    modes: names of the modes in their order, the first is the one that the pause begins in.
+    switch_times [s]: when each of `modes` is asked for.
+    expected [J]: mean energy; the same as `energy`.
+    worst [J]: largest energy over the lengths that are possible.
+    clairvoyant [J]: mean energy if each length were known at the start.
+    late [s]: mean time from the end of the pause until the robot is ready.
+    latest [s]: the largest of these times.
+    posture: name of the posture to wait at; "": where the robot stands.
+    posture_energies [J]: at each posture that was asked about, movements included; inf: it can't
+        be reached, or not in time.
+    saving_low, saving_high [J]: 90 % interval of `saving`.
+    trips: a sentence for each posture: what moving there and back takes.
+    remark: what the powers of the modes rest on, "" where there is nothing to say.
     """
 
     chosen: PowerMode
@@ -353,49 +127,23 @@ class Standby:
         )
 
 
-def pause_energy(
-    name: str, pause: float, q: FloatArray, scene: PlanningScene, times: TransitionTimes
-) -> float:
-    """Energy [J] of a pause [s] in a mode until the next movement can start, inf when it is too
-    short for it.
-
-    The robot stands at q (n,). On motors: with what the controller does by itself.
-    """
-    rests = rests_at(q, scene, times)
-    return (
-        rests.cost((), pause)[0] if name == MOTORS else rests.in_time((rests.named(name),), pause)
-    )
-
-
-def late_start(pause: float, scene: PlanningScene, times: TransitionTimes) -> float:
-    """How much later than the end of a pause [s] on motors the next movement starts: the brakes
-    that the controller has closed must open.
-    """
-    return rests_at(np.array(scene.cell.machine_home), scene, times).cost((), pause)[1]
-
-
 def plan_standby(
-    pause: float, q: FloatArray, scene: PlanningScene, times: TransitionTimes
+    pause: float | PauseLengths, q: FloatArray, scene: PlanningScene, times: TransitionTimes
 ) -> Standby:
-    """How to spend a pause [s] at q (n,). Raises RequestError for a pause that is none."""
-    return advice(lengths_of(pause), q, scene, times)
-
-
-def advice(
-    lengths: PauseLengths, q: FloatArray, scene: PlanningScene, times: TransitionTimes
-) -> Standby:
-    """How to spend a pause of these lengths at q (n,)."""
+    """How to spend a pause [s], or one of these lengths, at q (n,). Raises RequestError for a pause
+    that is none.
+    """
+    lengths = pause if isinstance(pause, PauseLengths) else lengths_of(pause)
     rests = rests_at(q, scene, times)
-    pause = lengths.most
-    steps, cost = _known(rests, pause) if lengths.known else _policy(rests, lengths)
+    steps, cost = _known(rests, lengths.most) if lengths.known else _policy(rests, lengths)
     by_itself = rests.mean_cost((), lengths.likely)
-    modes, switches = _shown(rests, steps, pause)
+    modes, switches = _shown(rests, steps, lengths.most)
     chosen = steps[-1].rest.name if steps else MOTORS
     saving = by_itself - cost.expected
     within = _saved_within(saving, steps, lengths, rests, q, scene)
     return Standby(
         chosen=_mode(chosen, q, scene, times),
-        wake_at=pause - times.leave(chosen) if lengths.known else float("inf"),
+        wake_at=times.rest(chosen).wake_at(lengths.most) if lengths.known else float("inf"),
         energy=cost.expected,
         saving=saving,
         saving_low=within.low,
@@ -488,21 +236,14 @@ def _mode(name: str, q: FloatArray, scene: PlanningScene, times: TransitionTimes
     """
     data = scene.power.mode(name)
     motors = mode_watts(MOTORS, q, scene)
-    enter = times.enter(name)
-    leave = times.leave(name)
-    stay = times.minimum_stay(name)
+    rest = times.rest(name)
     recharge = 0.0 if drive_bus_up(name) else recharge_of(scene).whole
-    return PowerMode(
-        mode=Mode[name],
-        name=name,
+    return replace(
+        times.of(Mode[name]),
         pe_mode_id=data.pe_mode_id,
         power=mode_watts(name, q, scene),
-        time_min_pause=enter + leave + stay,
-        time_to_pause=enter,
-        regular_time_to_operate=leave,
-        time_min_length_of_stay=stay,
-        energy_to_pause=motors * enter,
-        energy_to_operate=motors * leave + recharge,
+        energy_to_pause=motors * rest.enter,
+        energy_to_operate=motors * rest.leave + recharge,
         break_even=break_even(name, q, scene, times),
     )
 
@@ -522,112 +263,28 @@ def break_even(name: str, q: FloatArray, scene: PlanningScene, times: Transition
         return 0.0
     motors = mode_watts(MOTORS, q, scene)
     shallower = known[k - 1]
-    deeper = name
-    watts = [mode_watts(mode, q, scene) for mode in (shallower, deeper)]
-    extra = [
-        (motors - power) * (times.enter(mode) + times.leave(mode))
-        for mode, power in zip((shallower, deeper), watts, strict=True)
-    ]
-    gain = watts[0] - watts[1]
+    watts = mode_watts(shallower, q, scene)
+    deeper_watts = mode_watts(name, q, scene)
+    gain = watts - deeper_watts
     if gain <= 0.0:
         return float("inf")
     recharge = recharge_of(scene)
 
+    def changing(mode: str, power: float) -> float:
+        """Joules that entering and leaving a mode on motors takes beyond being in it."""
+        rest = times.rest(mode)
+        return (motors - power) * (rest.enter + rest.leave)
+
     def charged(mode: str, pause: float) -> float:
-        off = pause - times.enter(mode) - times.leave(mode)
+        """Joules that charge the DC link again after a pause [s]."""
+        rest = times.rest(mode)
+        off = pause - rest.enter - rest.leave
         return 0.0 if drive_bus_up(mode) else recharge.joules(max(off, 0.0))
 
-    pays = (extra[1] - extra[0]) / gain
+    # the pause at which power * pause + changing + charged are the same for both modes
+    extra = changing(name, deeper_watts) - changing(shallower, watts)
+    pays = extra / gain
     for _ in range(_ROUNDS):  # charging the DC link costs more after longer pauses, up to a bound
-        more = charged(deeper, pays) - charged(shallower, pays)
-        pays = (extra[1] - extra[0] + more) / gain
-    shortest = times.enter(deeper) + times.minimum_stay(deeper) + times.leave(deeper)
-    return float(max(pays, shortest))
-
-
-# Where to wait: at which of some postures a pause costs least, moving there and back included.
-#
-# The movement there is the beginning of the pause. Of a pause of known length the movement back is
-# its end; where the end is not known, the robot is woken at the end and ready when it is back.
-
-
-@dataclass(frozen=True, eq=False)
-class Trip:
-    """To a posture q (n,) and back: seconds and joules at the mains of both; ids of the
-    trajectories.
-
-    problem: why it isn't possible, "" where it is.
-    """
-
-    posture: str
-    q: FloatArray
-    there: tuple[float, float] = (0.0, 0.0)
-    back: tuple[float, float] = (0.0, 0.0)
-    ids: tuple[str, str] = ("", "")
-    problem: str = ""
-
-    @property
-    def joules(self) -> float:
-        """Energy [J] of both movements."""
-        return self.there[1] + self.back[1]
-
-    @property
-    def sentence(self) -> str:
-        """What the trip takes."""
-        if self.problem:
-            return f"{self.posture} is out of the question: {self.problem}"
-        both = (("there", self.there, self.ids[0]), ("back", self.back, self.ids[1]))
-        return f"{self.posture}: " + ", ".join(
-            f"{joules:.0f} J in {seconds:.2f} s {where}" + (f" ({name})" if name else "")
-            for where, (seconds, joules), name in both
-        )
-
-
-def best_posture(
-    lengths: PauseLengths,
-    q: FloatArray,
-    trips: tuple[Trip, ...],
-    scene: PlanningScene,
-    times: TransitionTimes,
-) -> Standby:
-    """How to spend a pause of these lengths, and where: at q (n,), where the robot stands, or
-    elsewhere.
-    """
-    here = advice(lengths, q, scene, times)
-    options = [_after(trip, here, lengths, scene, times) for trip in trips]
-    energies = tuple(float("inf") if option is None else option.energy for option in options)
-    best = min(
-        (here, *(option for option in options if option is not None)), key=lambda each: each.energy
-    )
-    return replace(best, posture_energies=energies, trips=tuple(trip.sentence for trip in trips))
-
-
-def _after(
-    trip: Trip, here: Standby, lengths: PauseLengths, scene: PlanningScene, times: TransitionTimes
-) -> Standby | None:
-    """The advice with a trip; None where there is none, or not the time for it."""
-    back = trip.back[0] if lengths.known else 0.0
-    left = lengths.less(trip.there[0] + back)
-    if trip.problem or left.most <= 0.0:
-        return None
-    there = advice(left, trip.q, scene, times)
-    late = 0.0 if lengths.known else trip.back[0]
-    energy = there.energy + trip.joules
-    return replace(
-        there,
-        energy=energy,
-        expected=energy,
-        worst=there.worst + trip.joules,
-        clairvoyant=there.clairvoyant + trip.joules,
-        saving=here.saving + here.energy - energy,
-        saving_low=there.saving_low + here.saving + here.energy - energy - there.saving,
-        saving_high=there.saving_high + here.saving + here.energy - energy - there.saving,
-        saving_on_motors=here.saving_on_motors + here.energy - energy,
-        wake_at=there.wake_at + trip.there[0],
-        switch_times=tuple(at + trip.there[0] for at in there.switch_times),
-        alternatives=here.alternatives,
-        energies=here.energies,
-        late=there.late + late,
-        latest=there.latest + late,
-        posture=trip.posture,
-    )
+        more = charged(name, pays) - charged(shallower, pays)
+        pays = (extra + more) / gain
+    return float(max(pays, times.rest(name).shortest))

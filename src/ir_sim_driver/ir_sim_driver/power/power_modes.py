@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ir_msgs_py.modes import DRIVES_ON, READY, RESTS, ROW, Mode, ModeRow, TransitionTimes
+from ir_msgs_py.modes import DRIVES_ON, READY, RESTS, ROW, Mode, ModeRow, RestTimes, TransitionTimes
 from ir_sim_driver.errors import SettingsError
 from ir_values.settings import check_settings, setting
 
-# Times of every rest by its mode, and the controller's own timers.
+# The controller's own timers.
 
 _WEEK = 604_800.0
 
@@ -37,28 +37,6 @@ class IdleTimes:
 
     def __post_init__(self) -> None:
         check_settings(self)
-
-
-@dataclass(frozen=True)
-class Times:
-    """Seconds into a rest (enter), out of it to motors on (leave), and at least in it
-    (minimum_stay).
-    """
-
-    enter: float
-    leave: float
-    minimum_stay: float
-
-
-def times_of(transitions: TransitionTimes) -> dict[Mode, Times]:
-    """Times of every rest of the table."""
-    names = {row.mode: row.mode.name for row in RESTS}
-    return {
-        mode: Times(
-            transitions.enter(name), transitions.leave(name), transitions.minimum_stay(name)
-        )
-        for mode, name in names.items()
-    }
 
 
 # State machine.
@@ -115,7 +93,9 @@ class PowerModes:
             False: idle.motors_to_brakes_in_program,
             True: idle.motors_to_brakes_in_command,
         }
-        self.times: dict[Mode, Times] = times_of(transitions)
+        self.times: dict[Mode, RestTimes] = {
+            row.mode: transitions.rest(row.mode.name) for row in RESTS
+        }
         self.mode: Mode = start
         self.source: Mode = start
         self.elapsed = 0.0
@@ -146,10 +126,10 @@ class PowerModes:
         if row is not None:
             left = self.time_to_target
             times = self.times[row.mode]
-            return left + times.minimum_stay + times.leave if self.mode is row.entering else left
+            return left + times.stay + times.leave if self.mode is row.entering else left
         if self.mode in self.times:
             times = self.times[self.mode]
-            return max(0.0, times.minimum_stay - self.elapsed) + times.leave
+            return max(0.0, times.stay - self.elapsed) + times.leave
         return self.times[Mode.STAND_ON_BRAKES].leave if self.mode is Mode.EMERGENCY_STOP else 0.0
 
     def step(self, dt: float, demand: Demand) -> None:
@@ -179,7 +159,7 @@ class PowerModes:
             self._enter(Mode.EMERGENCY_STOP if demand.emergency else Mode.STAND_ON_MOTORS)
 
     def _stay(self, row: ModeRow, demand: Demand) -> None:
-        over = self.elapsed >= self.times[row.mode].minimum_stay - _INSTANT
+        over = self.elapsed >= self.times[row.mode].stay - _INSTANT
         if not row.on_the_network:
             self._wake = self._wake or demand.wake
             if self._wake and over:

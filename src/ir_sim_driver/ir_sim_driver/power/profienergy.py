@@ -15,8 +15,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 from ir_description.robot import DcLink
-from ir_msgs_py.modes import DRIVES_ON, ROW, Mode, PowerMode
-from ir_sim_driver.power.power_modes import Times
+from ir_msgs_py.modes import DRIVES_ON, ROW, Mode, PowerMode, RestTimes
 
 _ROUNDING = 1e-6  # s; a pause may be just as long as a sequence
 _ROUNDS = 50  # of a break-even whose cost depends on it
@@ -40,7 +39,7 @@ def uncharged(seconds: float) -> float:
 
 
 def mode_table(
-    times: Mapping[Mode, Times],
+    times: Mapping[Mode, RestTimes],
     power: Callable[[Mode], float],
     pe_ids: Mapping[Mode, int],
     source: Mode,
@@ -60,10 +59,10 @@ def mode_table(
             mode=mode,
             pe_mode_id=pe_ids[mode],
             power=power(mode),
-            time_min_pause=rest.enter + rest.leave + rest.minimum_stay,
+            time_min_pause=rest.shortest,
             time_to_pause=rest.enter,
             regular_time_to_operate=rest.leave,
-            time_min_length_of_stay=rest.minimum_stay,
+            time_min_length_of_stay=rest.stay,
             energy_to_pause=0.0 if source is mode else rest.enter * power(source),
             energy_to_operate=rest.leave * motors + (0.0 if mode in DRIVES_ON else whole),
         )
