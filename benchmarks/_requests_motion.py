@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from _kernels_peers import Coal
+from _coal_model import Coal
 from _requests_rows import NOT_ASKED, Row
 from _second_opinion import SecondOpinion
 from scipy.interpolate import BPoly

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pinocchio
+from _coal_model import Coal
 from _drives import Drives
-from _kernels_peers import Coal
 
 from ir_description.robot import RobotModel
 from ir_kernels import CollisionModel

@@ -221,7 +221,7 @@ def arguments() -> argparse.Namespace:
     )
     parser.add_argument("--rounds", type=int, default=3, help="timed rounds; 0: the answers alone")
     parser.add_argument(
-        "--script", action="append", default=[], help="a benchmark to run in both, as kernels"
+        "--script", action="append", default=[], help="a benchmark to run in both, as regional"
     )
     add_ending(parser, "every third request, one timed round")
     given = parser.parse_args()

@@ -16,7 +16,7 @@ from ir_planner import EscapePlan, Planner, RequestError
 from ir_planner.regional.escape import DEEPER
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # the judge
-from _kernels_peers import Coal
+from _coal_model import Coal
 from _second_opinion import SecondOpinion
 
 MARGIN = 0.02  # m

@@ -24,7 +24,7 @@ from ir_values.arrays import FloatArray
 from ir_values.errors import TrajectoryError
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # the judges
-from _kernels_peers import Coal
+from _coal_model import Coal
 from _second_opinion import SecondOpinion
 
 MARGIN = 0.02  # m
