@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from _paper_result import MEASURED, Experiment, Row, Statement, finished, panels
-from _regional_ours import planner_of
 from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 from scipy.spatial import ConvexHull
@@ -50,7 +49,7 @@ CORNER = np.array(
 
 def measure(seed: int, quick: bool) -> list[Row]:
     """A row per movement of the planned program: the tool's path, and what kind it is."""
-    planner = planner_of(CELL)
+    planner = Planner(CELL)
     plan = planner.plan_program(
         options=PlanOptions(planning_time=60.0), start=np.array(planner.cell.park)
     )
@@ -102,7 +101,7 @@ def measure_pictures(seed: int, quick: bool) -> list[Row]:
     """What the services answer for the figures: states in a semi-closed zone with their metric
     distance, verdict, kind and parts; and a trajectory through four points.
     """
-    planner = planner_of(CELL)
+    planner = Planner(CELL)
     plan = planner.plan_service(STATION, direction="exit", options=PlanOptions(seed=1))
     out = plan.candidates[0].trajectory
     inside = out.sample(np.array([INSIDE * out.duration])).q[0]
@@ -258,7 +257,7 @@ def _machines(panel: Axes, cell: Cell, view: FloatArray) -> None:
 
 
 def _robot(panel: Axes, cell: Cell, view: FloatArray, q: FloatArray) -> None:
-    scene = planner_of(CELL).scene()
+    scene = Planner(CELL).scene()
     links = scene.chain.link_poses(q[None])[0]
     loads = [capsule for load in scene.loads for capsule in load.capsules]
     for capsule in (*cell.robot.capsules, *loads):

@@ -21,9 +21,9 @@ from _paper_result import (
     percent,
     rank_correlation,
 )
-from _regional_ours import planner_of
 from scipy.stats import kendalltau
 
+from ir_planner import Planner
 from ir_planner.scene import movement_cost
 from ir_planner.scene.movement_cost import movement_weights
 from ir_values.arrays import FloatArray
@@ -42,7 +42,7 @@ CHOICE = "a pose costs hardly more than the one of least energy"
 
 def measure(seed: int, quick: bool) -> list[Row]:
     """A row per movement, and one with what else reaches the same pose where anything does."""
-    planner = planner_of(CELL)
+    planner = Planner(CELL)
     rows = []
     for pair in pairs(planner, QUICK_PAIRS if quick else PAIRS, seed):
         trajectory = pair.common()

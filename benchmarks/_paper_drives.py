@@ -9,8 +9,8 @@ from dataclasses import replace
 
 from _paper_pairs import CELL, DRAWN, Pair, pairs
 from _paper_result import Experiment, Row, Statement, geometric_mean, interval
-from _regional_ours import planner_of
 
+from ir_planner import Planner
 from ir_planner.scene import LinkVoltage, PlanningScene
 
 PAIRS = 400  # per seed
@@ -23,7 +23,7 @@ OBJECTIVES = {"least time": "time", "least J": "time_and_energy"}
 
 def measure_voltage(seed: int, quick: bool) -> list[Row]:
     """A row per movement, bound and objective: seconds and joules of the straight movement."""
-    planner = planner_of(CELL)
+    planner = Planner(CELL)
     rows = []
     for pair in pairs(planner, QUICK_PAIRS if quick else PAIRS, seed + 40):
         volt = pair.scene.power.dc_link.voltage
@@ -85,7 +85,7 @@ def measure_tools(seed: int, quick: bool) -> list[Row]:
     """A row per movement: seconds and joules of the fastest straight movement by mass of the
     tool.
     """
-    planner = planner_of(CELL)
+    planner = Planner(CELL)
     rows = []
     for pair in pairs(planner, 2 * (QUICK_PAIRS if quick else PAIRS), seed + 60):
         if not pair.scene.loads:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 from _paper_result import FAILS, HOLDS, Experiment, Row, Statement, finished, interval, panels
-from _regional_ours import planner_of
 
 from ir_description import load_power_data
 from ir_msgs_py.options import PlanOptions
+from ir_planner import Planner
 from ir_recorder.analysis.production import Amount
 from ir_recorder.report.costs import Costs
 from ir_recorder.report.whole_line import WholeLine, of_whole_line
@@ -32,7 +32,7 @@ def measure(seed: int, quick: bool) -> list[Row]:
     rows = [_row("demo", (), seed)]
     rng = np.random.default_rng([seed, 1])
     for cell, count in ({"open": 1} if quick else TOURS).items():
-        names = [station.name for station in planner_of(cell).cell.stations]
+        names = [station.name for station in Planner(cell).cell.stations]
         for _ in range(count):
             stops = tuple(str(name) for name in rng.permutation(names)[:STOPS])
             rows.append(_row(cell, stops, seed))
@@ -40,7 +40,7 @@ def measure(seed: int, quick: bool) -> list[Row]:
 
 
 def _row(cell: str, stops: tuple[str, ...], seed: int) -> Row:
-    planner = planner_of(cell)
+    planner = Planner(cell)
     asked = PlanOptions(seed=seed, planning_time=PLANNING_S)
     plan = planner.plan_program(
         stations=stops, options=asked, start=np.array(planner.cell.park), savings=True

@@ -22,7 +22,6 @@ from _paper_result import (
     percent,
     wilson,
 )
-from _regional_ours import planner_of
 
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Goal, Planner
@@ -54,7 +53,7 @@ ARMS = {
 
 def measure(seed: int, quick: bool) -> list[Row]:
     """A row per movement: the common PTP, and the planner's answers to what is asked of it."""
-    planner = planner_of(CELL)
+    planner = Planner(CELL)
     return [_row(planner, pair) for pair in pairs(planner, QUICK_PAIRS if quick else PAIRS, seed)]
 
 

@@ -22,10 +22,10 @@ from _paper_result import (
     interval,
     panels,
 )
-from _regional_ours import planner_of
 from scipy.interpolate import make_interp_spline
 
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner import Planner
 from ir_planner.curves import natural_durations, spline_through, virtual_knots
 from ir_planner.scene import torque_use
 from ir_values.arrays import FloatArray
@@ -52,7 +52,7 @@ def measure(seed: int, quick: bool) -> list[Row]:
     """A row per movement and number of vias: joules of every curve and the seconds that all of them
     take.
     """
-    planner = planner_of(CELL)
+    planner = Planner(CELL)
     rng = np.random.default_rng([seed, 10])
     rows = []
     for pair in pairs(planner, QUICK_PAIRS if quick else PAIRS, seed):

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Iterator
 from itertools import cycle
-from pathlib import Path
 
 from _regional_ompl import PLANNERS, OmplPath, ompl_path
 from _regional_ours import asked, until
@@ -33,14 +31,6 @@ def best_of(planner: Planner, task: Task, seconds: float) -> dict[str, Cost]:
         if costs:
             found[name] = min(costs, key=lambda cost: cost.J)
     return found
-
-
-def read(file: Path) -> dict[str, tuple[str, float]]:
-    """Method and J per task of an earlier run's JSON."""
-    rows = json.loads(file.read_text())["rows"]
-    return {
-        row["task"]: (row["best_by"], float(row["best_J"])) for row in rows if row.get("best_J")
-    }
 
 
 def _ompl(task: Task, seconds: float) -> Iterator[tuple[OmplPath, Cost]]:

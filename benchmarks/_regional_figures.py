@@ -31,13 +31,10 @@ class PeerRun:
 
 @dataclass(frozen=True, eq=False)
 class Figures:
-    """All runs of one task, and `patient` ones with 1 s of work; left [m] by Coal over `asked`
-    configurations; share of the limits.
-    """
+    """All runs of one task; left [m] by Coal over `asked` configurations; share of the limits."""
 
     task: Task
     runs: tuple[Run, ...]
-    patient: tuple[Run, ...]
     peers: tuple[PeerRun, ...]
     best_by: str
     best_known: float
@@ -101,7 +98,6 @@ class Figures:
         if np.isfinite(self.best_known):
             row |= {"best_J": round(self.best_known, 1), "best_by": self.best_by}
             row["near_best"] = f"{self.near_best(self.runs)}/{len(self.runs)}"
-            row["near_best_1s"] = f"{self.near_best(self.patient)}/{len(self.patient)}"
         return row
 
 
@@ -127,11 +123,6 @@ def claims_of(figures: list[Figures]) -> list[Claim]:
                 claims.append(
                     at_most(f"{what}, {cell}, median", float(np.median(values)), "ms", bounds[cell])
                 )
-    patient = sum(len(f.patient) for f in figures)
-    if patient:
-        near = 100.0 * sum(f.near_best(f.patient) for f in figures) / patient
-        name = f"runs with 1 s of work: J at most {OF_BEST} times the best known"
-        claims.append(at_least(name, near, "%", 90.0))
     near = 100.0 * sum(f.near_best(f.runs) for f in figures) / len(runs)
     name = f"runs with the default budget: J at most {OF_BEST} times the best known"
     claims.append(at_least(name, near, "%", 95.0))

@@ -1,12 +1,9 @@
-"""Runs of the planner: what a regional movement costs and how long it took, and whether answers
-repeat.
-"""
+"""Runs of the planner: what a regional movement costs and how long it took."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from _regional_tasks import TIME_VALUE, Cost, Task
@@ -14,14 +11,10 @@ from _regional_tasks import TIME_VALUE, Cost, Task
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlanningInfo
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
 from ir_planner.request.goals import Goal
 
 PLANNING_TIME = 1.0  # s
-ENDLESS = 100_000_000  # certified edges: more than the time holds
-# s: where ids are compared, so that the budget of work ends a search and never the clock
-UNHURRIED = 60.0
 FIRST = "first feasible"  # how the note of the stage begins that knew the first free path
 NOTHING = "nothing free"
 
@@ -46,11 +39,6 @@ class Run:
         return self.trajectory.trajectory_id if self.trajectory is not None else ""
 
 
-def planner_of(cell: str) -> Planner:
-    """A planner with the cell."""
-    return Planner(cell)
-
-
 def asked(task: Task, seed: int = 0) -> PlanOptions:
     """The request's options: J as the objective."""
     return PlanOptions(
@@ -70,11 +58,6 @@ def first_feasible(info: PlanningInfo) -> float:
             if says(stage.note):
                 return passed
     return float("nan")
-
-
-def notes_first(info: PlanningInfo) -> bool:
-    """Whether a stage notes the first feasible path."""
-    return any(stage.note.startswith(FIRST) for stage in info.stages)
 
 
 def run(planner: Planner, task: Task, options: PlanOptions) -> Run:
@@ -105,14 +88,6 @@ def runs(planner: Planner, task: Task, seeds: int) -> list[Run]:
     return [run(planner, task, asked(task, seed)) for seed in range(seeds)]
 
 
-def patient_runs(planner: Planner, task: Task, seeds: int) -> list[Run]:
-    """The same with as much work as PLANNING_TIME holds."""
-    return [
-        run(planner, task, replace(asked(task, seed), max_iterations=ENDLESS))
-        for seed in range(seeds)
-    ]
-
-
 def until(planner: Planner, task: Task, seconds: float, iterations: int) -> Iterator[Cost]:
     """Costs of answers with a large budget and one seed after the other, until the time is up."""
     end = time.perf_counter() + seconds
@@ -125,50 +100,3 @@ def until(planner: Planner, task: Task, seconds: float, iterations: int) -> Iter
         if found.cost is not None:
             yield found.cost
         seed += 1
-
-
-def repeats(planner: Planner, tasks: Sequence[Task]) -> tuple[int, int]:
-    """How many of the answers come again bit by bit: asked twice, and by two threads at once; of
-    how many.
-    """
-
-    def identity(task: Task, seed: int) -> str:
-        return run(planner, task, replace(asked(task, seed), planning_time=UNHURRIED)).trajectory_id
-
-    same = 0
-    count = 0
-    with ThreadPoolExecutor(2) as threads:
-        for task, other in zip(tasks, [*tasks[1:], tasks[0]], strict=True):
-            alone = identity(task, 0), identity(other, 1)
-            again = identity(task, 0)
-            together = tuple(threads.map(identity, (task, other), (0, 1)))
-            same += (again == alone[0]) + (together[0] == alone[0]) + (together[1] == alone[1])
-            count += 3
-    return same, count
-
-
-def knows(planner: Planner, task: Task, planner_id: str) -> bool:
-    """Whether the planner takes this planner_id."""
-    try:
-        planner.plan_regional(
-            start=task.start,
-            goal=Goal(configuration=task.start),
-            options=replace(asked(task), planner_id=planner_id),
-        )
-    except RequestError as error:
-        if "unknown" in str(error):
-            return False
-        raise
-    return True
-
-
-def solved_alone(
-    planner: Planner, tasks: Sequence[Task], planner_id: str, seeds: int
-) -> tuple[int, int]:
-    """Answers of one planner_id alone that are certified, of how many."""
-    found = [
-        run(planner, task, replace(asked(task, seed), planner_id=planner_id)).solved
-        for task in tasks
-        for seed in range(seeds)
-    ]
-    return sum(found), len(found)

@@ -1,125 +1,39 @@
-"""Do recordings keep everything, what does recording take, and how soon are they explained?
+"""Does a recording keep every message, what does recording take, and how soon is it explained?
 
-    python benchmarks/recording.py [--seconds S] [--minutes M] [--kills N] [--demo FILE] [--quick]
+    python benchmarks/recording.py [--seconds S] [--minutes M] [--quick] [--json FILE]
 
 A process publishes joint states at 1 kHz and the other topics of a cell, `ir-record` records them.
-A run of ten minutes is analysed and reported. Recordings are killed and read. A plan is recorded
-and planned again, or the demonstration's recording. The CDR reader is held against two libraries.
+A run of ten minutes is analysed and reported.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
-import random
-import re
 import resource
 import signal
-import struct
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from _driver_stream import process_cpu
 from _node_process import DOMAIN
-from _results import Claim, add_ending, at_least, at_most, finish, line_of
+from _results import Claim, add_ending, at_most, finish, line_of
 from builtin_interfaces.msg import Time
-from mcap.records import Schema
-from mcap_ros2.decoder import DecoderFactory
 from rclpy.serialization import serialize_message
-from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
 
 from ir_description import cell_to_yaml, load_cell, robot_urdf
 from ir_msgs.msg import ControllerState, PlannedMovement, PowerState, ProgramState
-from ir_recorder.errors import ReadError
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.reading.cdr import Columns
-from ir_recorder.reading.mcap_file import RawChannel, read_raw
+from ir_recorder.reading.mcap_file import read_raw
 from ir_recorder.recording import CellFiles, RecordingSession, RecordingWriter
-from ir_values.arrays import FloatArray
-
-# The columns of many CDR messages: the project's reader beside mcap-ros2-support and rosbags.
-
-Read = Callable[[Sequence[bytes]], FloatArray]
-DAMAGED = 2000
-
-
-def readers_of(channel: RawChannel) -> dict[str, Read]:
-    """Each gives positions (N, 6) of joint states."""
-    schema = Schema(1, channel.schema_text.encode(), channel.schema_encoding, channel.type)
-    decode = DecoderFactory().decoder_for("cdr", schema)
-    assert decode is not None
-    store = get_typestore(Stores.ROS2_JAZZY)
-    return {
-        "this project": lambda messages: Columns(
-            messages, channel.type, channel.schema_text
-        ).numbers("position", 6),
-        "mcap-ros2-support": lambda messages: np.array([decode(m).position for m in messages]),
-        "rosbags": lambda messages: np.array(
-            [_position(store.deserialize_cdr(m, channel.type)) for m in messages]
-        ),
-    }
-
-
-def _position(message: Any) -> Any:
-    return message.position
-
-
-def reader_rows(path: Path, most: int) -> Iterator[dict[str, Any]]:
-    """Processor time per message; whether all agree; what damaged messages do to each."""
-    channel = read_raw(path).channel("/joint_states")
-    assert channel is not None
-    messages = channel.messages[:most]
-    expected = None
-    damaged = damaged_messages(messages[0])
-    for name, read in readers_of(channel).items():
-        begun = time.process_time()
-        found = read(messages)
-        seconds = time.process_time() - begun
-        expected = found if expected is None else expected
-        refused, wrong = outcome_of(read, damaged)
-        yield {
-            "case": "reader",
-            "reader": name,
-            "messages": len(messages),
-            "us_per_message": 1e6 * seconds / len(messages),
-            "equal": bool(np.array_equal(found, expected)),
-            "refused": refused,
-            "other_errors": wrong,
-        }
-
-
-def damaged_messages(message: bytes) -> list[bytes]:
-    """The message cut short, or with some bytes replaced."""
-    chance = random.Random(1)
-    found = []
-    for _ in range(DAMAGED):
-        data = bytearray(message)
-        for _ in range(chance.randint(1, 8)):
-            data[chance.randrange(len(data))] = chance.randrange(256)
-        found.append(bytes(data[: chance.randint(1, len(data))] if chance.random() < 0.5 else data))
-    return found
-
-
-def outcome_of(read: Read, damaged: Sequence[bytes]) -> tuple[int, int]:
-    """How many damaged messages end in an error with a sentence, and in any other exception."""
-    refused = 0
-    other = 0
-    for message in damaged:
-        try:
-            read([message])
-        except ReadError:
-            refused += 1
-        except Exception:  # what the library happens to raise
-            other += 1
-    return refused, other
-
 
 # A cell's run as a recording, made without a robot: movements and rests at 500 Hz with their mains
 # meter.
@@ -207,41 +121,6 @@ def _put(session: RecordingSession, topic: str, message: Any, time: int) -> None
     session.message(topic, serialize_message(message), time)
 
 
-# Recordings of a process that is killed: how many seconds of messages are missing.
-
-WRITER = """
-import sys, time
-from ir_recorder.recording import RecordingSession, RecordingWriter
-from ir_recorder.recording.worker import Message, RecordingWorker
-
-session = RecordingSession(RecordingWriter(sys.argv[1]), {}, time.monotonic_ns())
-session.open_topic("/text", "std_msgs/msg/String", [])
-worker = RecordingWorker(session, 10_000_000)
-while True:
-    now = time.monotonic_ns()
-    worker.write([Message("/text", now.to_bytes(8, "little") * 50, now)])
-    time.sleep(0.001)
-"""
-
-
-def seconds_lost(folder: Path, number: int) -> float:
-    """Seconds between the kill and the last message that is in the file."""
-    path = folder / f"killed_{number}.mcap"
-    process = subprocess.Popen([sys.executable, "-c", WRITER, str(path)])
-    try:
-        while not path.exists() or path.stat().st_size < 20_000:
-            time.sleep(0.01)
-        time.sleep(random.Random(number).uniform(0.0, 1.5))
-    finally:
-        process.kill()
-        killed = time.monotonic_ns()
-        process.wait()
-    channel = read_raw(path).channel("/text")
-    assert channel is not None
-    (last,) = struct.unpack_from("<q", channel.messages[-1])
-    return float(killed - last) * 1e-9
-
-
 HERE = Path(__file__).resolve().parent
 
 
@@ -288,7 +167,7 @@ def streamed(folder: Path, seconds: float) -> dict[str, Any]:
     }
 
 
-def reported(folder: Path, minutes: float) -> tuple[dict[str, Any], Path]:
+def reported(folder: Path, minutes: float) -> dict[str, Any]:
     """Analyse and report a run of so many minutes in a process of its own."""
     path = folder / "run.mcap"
     page = folder / "run.html"
@@ -297,7 +176,7 @@ def reported(folder: Path, minutes: float) -> tuple[dict[str, Any], Path]:
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     begun = time.monotonic()
     subprocess.run([*command, "--root", str(folder)], check=True, capture_output=True)
-    row = {
+    return {
         "case": "report",
         "minutes": minutes,
         "messages": messages,
@@ -306,33 +185,12 @@ def reported(folder: Path, minutes: float) -> tuple[dict[str, Any], Path]:
         "page_mb": page.stat().st_size * 1e-6,
         "file_mb": path.stat().st_size * 1e-6,
     }
-    return row, path
-
-
-def replanned(folder: Path, demo: Path | None) -> dict[str, Any]:
-    """Plan a recorded plan again, or the demonstration's."""
-    path = demo or folder / "plan.mcap"
-    base = [sys.executable, "-m", "ir_cli.main"]
-    if demo is None:
-        plan = [*base, "plan", "demo", "-o", str(path)]
-        environment = {**os.environ, "IR_FILE_ROOTS": str(folder)}
-        subprocess.run(plan, check=True, capture_output=True, env=environment)
-    command = [*base, "ros", "replan", str(path), "--root", str(path.parent)]
-    said = subprocess.run(command, capture_output=True, text=True, check=False).stdout
-    found = re.search(r"(\d+) of (\d+) requests planned again with equal ids \((\d+) ids\)", said)
-    equal, requests, ids = map(int, found.groups()) if found else (0, 1, 0)
-    return {"case": "replan", "file": path.name, "requests": requests, "equal": equal, "ids": ids}
 
 
 def measured(folder: Path, given: argparse.Namespace) -> Iterator[dict[str, Any]]:
     """All rows, one after the other."""
     yield streamed(folder, given.seconds)
-    row, run = reported(folder, given.minutes)
-    yield row
-    yield from reader_rows(run, 20_000)
-    yield replanned(folder, given.demo)
-    for number in range(given.kills):
-        yield {"case": "killed", "lost_s": seconds_lost(folder, number)}
+    yield reported(folder, given.minutes)
 
 
 def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
@@ -343,10 +201,6 @@ def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
 
     (stream,) = of("stream")
     (report,) = of("report")
-    (again,) = of("replan")
-    own, *others = of("reader")
-    peer = min(row["us_per_message"] for row in others)
-    lost = max(row["lost_s"] for row in of("killed"))
     page = f"page of {report['minutes']:g} minutes"
     return [
         at_most(f"joint states lost in {stream['seconds']:g} s at 1 kHz", stream["lost"], "", 0),
@@ -355,13 +209,6 @@ def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
             f"{report['minutes']:g} minutes analysed and reported", report["wall_s"], "s", 15.0
         ),
         at_most(page, report["page_mb"], "MB", 8.0),
-        at_least("requests planned again with equal ids", again["equal"], "", again["requests"]),
-        at_most(f"lost by a kill, worst of {len(of('killed'))}", lost, "s", 1.0),
-        at_least(
-            "reading columns, times the faster library", peer / own["us_per_message"], "", 1.0
-        ),
-        at_least("readers that agree", sum(row["equal"] for row in (own, *others)), "", 3),
-        at_most("damaged messages without a sentence", own["other_errors"], "", 0),
     ]
 
 
@@ -374,14 +221,11 @@ def main() -> None:
     parser.add_argument(
         "--minutes", type=float, default=10.0, help="of the run that is reported (10)"
     )
-    parser.add_argument("--kills", type=int, default=50, help="recordings that are killed (50)")
-    parser.add_argument("--demo", type=Path, help="recording of the demonstration to plan again")
-    add_ending(parser, "10 s of recording, 2 minutes of a run, 5 kills")
+    add_ending(parser, "10 s of recording, 2 minutes of a run")
     given = parser.parse_args()
     if given.quick:
         given.seconds = 10.0
         given.minutes = 2.0
-        given.kills = 5
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         rows: list[dict[str, Any]] = []

@@ -33,7 +33,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from _layout_study import LAYOUT_PARTS, layout_claims
-from _regional_ours import asked, planner_of
+from _regional_ours import asked
 from _regional_tasks import Task, tasks_of
 from _results import Claim, at_least, at_most, command_line, finish, line_of
 from _second_opinion import SecondOpinion
@@ -129,7 +129,7 @@ def answers_of(
 ) -> list[dict[str, object]]:
     """A row per planner: what it solved, what is not certified, and the least that Coal leaves."""
     tasks = tasks_of(cell)
-    planner = planner_of(cell)
+    planner = Planner(cell)
     opinion = SecondOpinion(tasks[0].scene)
     rows = []
     for name in planners:

@@ -17,7 +17,7 @@ OPTIONS = {"--cell", "--seeds", "--quick", "--json"}
 OTHERS = {
     "compare": {"--before", "--after", "--quick", "--json"},  # its requests name cells and seeds
     "soak": {"--minutes", "--quick", "--json"},  # one cell for an hour
-    "recording": {"--seconds", "--minutes", "--kills", "--demo", "--quick", "--json"},
+    "recording": {"--seconds", "--minutes", "--quick", "--json"},
     "paper": {"--only", "--again", "--seeds", "--quick", "--json"},  # each claim names its cells
     "hostile": {"--seeds", "--quick", "--json"},  # one cell: it asks for the driver
     "strangers": {"--seeds", "--quick", "--json"},  # files, no cells

@@ -15,11 +15,11 @@ import pinocchio
 import pytest
 from _paper_pairs import Pair, pairs
 from _pinocchio_arm import pinocchio_arm
-from _regional_ours import planner_of
 from numpy.typing import NDArray
 
 from ir_description import load_power_data
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner import Planner
 
 FloatArray = NDArray[np.float64]
 SHARE = 0.9  # of the torque envelope that plans may use
@@ -28,7 +28,7 @@ TIME_VALUE = 500.0  # W
 
 @pytest.fixture(scope="module")
 def drawn() -> list[Pair]:
-    return list(pairs(planner_of(_paper_pairs.CELL), 4, 21))
+    return list(pairs(Planner(_paper_pairs.CELL), 4, 21))
 
 
 def counterbalance(pair: Pair, a2: FloatArray) -> FloatArray:
