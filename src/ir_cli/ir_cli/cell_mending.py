@@ -168,7 +168,7 @@ def changed_station(cell: Cell, station: Station) -> Cell:
 
 
 def changed_machine(cell: Cell, machine: Equipment) -> Cell:
-    """The same for a machine."""
+    """The cell with a machine changed."""
     return replace(
         cell,
         equipment=tuple(machine if each.name == machine.name else each for each in cell.equipment),

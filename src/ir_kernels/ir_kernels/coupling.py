@@ -37,21 +37,21 @@ class Coupling:
             array.setflags(write=False)
 
     def motors(self, motion: FloatArray) -> FloatArray:
-        """What the motors do where the joints move so: angles, speeds or accelerations."""
+        """Motion (..., n) of the motors, T motion: angles [rad], speeds or accelerations."""
         return portable.matmul(motion, self.turns.T) if self.coupled else motion
 
     def joints(self, motion: FloatArray) -> FloatArray:
-        """What the joints do where the motors move so."""
+        """Motion (..., n) of the joints where the motors move so, T^-1 motion."""
         return portable.matmul(motion, self.inverse.T) if self.coupled else motion
 
     def motor_torque(self, torque: FloatArray) -> FloatArray:
-        """What the motors give [Nm] where the joints need this."""
+        """Torques (..., n) [Nm] of the motors for these of the joints, T^-T torque."""
         return portable.matmul(torque, self.inverse) if self.coupled else torque
 
     def joint_torque(self, torque: FloatArray) -> FloatArray:
-        """What the joints get [Nm] where the motors give this."""
+        """Torques (..., n) [Nm] at the joints of these of the motors, T^T torque."""
         return portable.matmul(torque, self.turns) if self.coupled else torque
 
     def most(self, speed: FloatArray) -> FloatArray:
-        """What no motor exceeds where no joint is faster than this (..., n)."""
+        """Bounds (..., n) of the motors' speeds where no joint is faster than this, |T| speed."""
         return portable.matmul(speed, np.abs(self.turns).T) if self.coupled else speed

@@ -168,7 +168,7 @@ def roots(polynomials: FloatArray) -> FloatArray:
 
 
 def geomspace(first: float, last: float, count: int) -> FloatArray:
-    """`count` numbers from `first` to `last`, each the same factor above the one before."""
+    """Numbers (count,) from `first` to `last`, each the same factor above the one before."""
     values = np.asarray(first * power(last / first, np.arange(count) / max(count - 1, 1)))
     if count > 1:
         values[-1] = last

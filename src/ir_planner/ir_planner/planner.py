@@ -261,7 +261,7 @@ class Planner:
     def check_states(
         self, q: FloatArray, *, safety_distance: float = MARGIN, load: str = "", station: str = ""
     ) -> StatesCheck:
-        """The same for many states q (N, n), with the nearest pair of each."""
+        """Checks of many states q (N, n) [rad], with the nearest pair of each."""
         return asked_states(self.scene(load), q, safety_distance, station)
 
     def compute_ik(

@@ -100,7 +100,9 @@ def plot_front(reports: list[TrajectoryReport], title: str) -> Any:
 def plot_profiles(
     times: FloatArray, distances: FloatArray, watt_times: FloatArray, watts: FloatArray, title: str
 ) -> Any:
-    """Clearance and mains power over time, as a matplotlib figure."""
+    """A matplotlib figure: clearance (N,) [m] over times (N,) [s], and mains power (M,) [W] over
+    watt_times (M,) [s].
+    """
     figure, (clearance, power) = _figure(2)
     figure.suptitle(title, wrap=True, fontsize="medium")
     clearance.plot(times, 1e3 * distances)

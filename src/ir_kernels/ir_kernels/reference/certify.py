@@ -48,16 +48,16 @@ class Edges:
         self.step = q1 - q0
 
     def span(self) -> FloatArray:
-        """Every edge runs from 0 to 1."""
+        """(M,): every edge runs from 0 to 1."""
         return np.ones(len(self.q0))
 
     def at(self, rows: IntArray, parameter: FloatArray) -> FloatArray:
-        """Linear in the parameter."""
+        """(I, n): q0 + u (q1 - q0)."""
         result: FloatArray = self.q0[rows] + parameter[:, None] * self.step[rows]
         return result
 
     def spread(self, rows: IntArray, middle: FloatArray, half: FloatArray) -> FloatArray:
-        """Half of the motion over the interval."""
+        """(I, n): half of the motion over the interval [rad], exact for a straight segment."""
         result: FloatArray = half[:, None] * np.abs(self.step[rows])
         return result
 
@@ -72,15 +72,15 @@ class Polynomials:
         self.durations = durations
 
     def span(self) -> FloatArray:
-        """The durations."""
+        """(M,): the durations [s]."""
         return self.durations
 
     def at(self, rows: IntArray, parameter: FloatArray) -> FloatArray:
-        """Horner's rule."""
+        """(I, n): q(t), by Horner's rule."""
         return self._shifted(rows, parameter)[..., 0]
 
     def spread(self, rows: IntArray, middle: FloatArray, half: FloatArray) -> FloatArray:
-        """Sum of the absolute terms of the polynomial about the middle, at the interval's end."""
+        """(I, n): sum_k |c_k| half^k over k >= 1 [rad], c_k of the polynomial about the middle."""
         shifted = np.abs(self._shifted(rows, middle))
         powers = np.cumprod(np.repeat(half[:, None], shifted.shape[-1] - 1, axis=1), axis=1)
         result: FloatArray = np.einsum("ijk,ik->ij", shifted[..., 1:], powers)

@@ -41,7 +41,7 @@ class Tree:
         self.cut: set[int] = set()
 
     def add(self, q: FloatArray, parent: int) -> int:
-        """The number of a new node."""
+        """Append a node at q (n,) below `parent`; its number."""
         self.nodes.append(q)
         self.parent.append(parent)
         self.root.append(self.root[parent])
@@ -55,7 +55,7 @@ class Tree:
                 self.cut.add(k)
 
     def nearest(self, q: FloatArray) -> tuple[int, float]:
-        """The nearest node and its weighted distance."""
+        """Number of the nearest node to q (n,) and its weighted distance."""
         away = np.linalg.norm((np.array(self.nodes) - q) * self.scale, axis=1)
         away[list(self.cut)] = np.inf
         node = int(np.argmin(away))

@@ -25,7 +25,9 @@ class Surface:
     def meets(
         self, other: Surface, poses: FloatArray, near: float, enough: int
     ) -> tuple[BoolArray, int]:
-        """As its namesake there."""
+        """Whether it is nearer than `near` [m] (N,), and how many pairs were looked at, as
+        `ir_kernels.surfaces.Surface.meets`; poses (N, 4, 4).
+        """
         met = np.zeros(len(poses), dtype=bool)
         looked_at = 0
         for k, pose in enumerate(poses):
@@ -35,7 +37,7 @@ class Surface:
         return met, looked_at
 
     def touching(self, other: Surface, pose: FloatArray, near: float) -> BoolArray:
-        """As its namesake there."""
+        """Which of its triangles (T,) are nearer than `near` [m]; pose (4, 4) in the other one."""
         return self._touching(other, pose, near)[0]
 
     def _touching(self, other: Surface, pose: FloatArray, near: float) -> tuple[BoolArray, int]:

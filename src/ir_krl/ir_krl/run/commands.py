@@ -59,7 +59,9 @@ class Target:
         return np.asarray(portable.matmul(self.base, led, _inverse(self.tool)))
 
     def pose(self, flange: FloatArray) -> FloatArray:
-        """The converse."""
+        """The tool (..., 4, 4) [m] in the base, or in the workpiece, where the flange is at
+        (..., 4, 4) in the robot's foot.
+        """
         if self.external:
             return np.asarray(
                 portable.matmul(_inverse(portable.matmul(flange, self.tool)), self.base)

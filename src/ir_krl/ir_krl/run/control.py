@@ -179,7 +179,7 @@ class Control:
         self.note_at(self.place(tree), text, effect)
 
     def note_at(self, place: SourcePlace, text: str, effect: Effect = Effect.NONE) -> None:
-        """The same of a place."""
+        """Note once what a reader should know, of a place."""
         at = self._said.setdefault((text, effect), len(self.notes))
         if at == len(self.notes):
             self.notes.append(Note(place, text, effect))
@@ -528,7 +528,7 @@ class Control:
         return []
 
     def _waited_signal(self, tree: SyntaxTree, *, wanted: bool) -> list[tuple[int, bool]]:
-        """The same of an input, or of those that a cyclical flag follows."""
+        """Inputs that a signal leaves no choice: itself, or those that a cyclical flag follows."""
         (name, index), *rest = self.expressions.path(tree)
         if name == INPUT and index is not None and not rest:
             return [(index[0], wanted)]
@@ -537,7 +537,9 @@ class Control:
         return []
 
     def _waited_compared(self, tree: SyntaxTree, *, wanted: bool) -> list[tuple[int, bool]]:
-        """The same of a comparison with TRUE or FALSE, or of a group of inputs with a number."""
+        """Inputs that a comparison leaves no choice: with TRUE or FALSE, or of a group of inputs
+        with a number.
+        """
         left, sign, right = tree.children
         if right.data in ("true", "false"):
             same = (str(sign) == "==") is (right.data == "true")

@@ -406,7 +406,7 @@ def _holds(value: Value | None, name: str) -> TypeGuard[Structure]:
 
 
 def _component(arguments: Arguments, name: str, place: SourcePlace) -> float:
-    """The same as a number. Raises KrlRunError where no argument has it."""
+    """A component of an argument as a number. Raises KrlRunError where no argument has it."""
     if not any(_holds(value, name) for value in arguments):
         raise KrlRunError(
             f"no argument has a component {name}: give the .dat with the form's data", place

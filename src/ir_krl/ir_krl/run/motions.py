@@ -547,11 +547,11 @@ class _Trigger:
     file: str
 
     def of_part(self, part: int) -> _Trigger:
-        """The same of a part of a spline."""
+        """The trigger at a part of a spline."""
         return replace(self, switch=replace(self.switch, part=part))
 
     def behind(self) -> _Trigger:
-        """The same, whose motion stands before it among the commands."""
+        """The trigger whose motion stands before it among the commands."""
         return replace(self, switch=replace(self.switch, ahead=False))
 
 

@@ -357,7 +357,7 @@ def assumed_variables(forms: FormAge = FormAge.OPEN) -> dict[str, Assumption]:
 
 
 def all_axes(value: float) -> Array:
-    """The same of every axis."""
+    """An array with one value for every axis."""
     return Array({(n,): value for n in range(1, AXES + 1)})
 
 

@@ -376,7 +376,7 @@ def _families(count: int, before: IntArray, after: IntArray) -> IntArray:
 def _by_pairs(
     q: FloatArray, layer: IntArray, turning: BoolArray, jump: float
 ) -> tuple[IntArray, IntArray]:
-    """The same in any order, all pairs compared axis by axis: quicker where layers are small."""
+    """Edges in any order, all pairs compared axis by axis: quicker where layers are small."""
     count = np.bincount(layer)
     begin = np.cumsum(count) - count
     number = np.full((len(count), count.max(initial=0)), -1)
@@ -397,7 +397,7 @@ def _by_pairs(
 def _by_tree(
     q: FloatArray, layer: IntArray, turning: BoolArray, jump: float
 ) -> tuple[IntArray, IntArray]:
-    """The same by a tree of all configurations: where layers are large."""
+    """Edges in any order, by a tree of all configurations: where layers are large."""
     from scipy.spatial import cKDTree
 
     box = np.append(np.where(turning, TURN / jump, 0.0), 0.0)  # 0: not periodic

@@ -86,7 +86,9 @@ def best_along(asked: ToolPathRequest, layers: Layers) -> DrivenPath:
 
 
 def _best_within_tolerance(asked: ToolPathRequest, layers: Layers) -> DrivenPath:
-    """The same at the speed asked for; where that isn't found, evenly as much slower as may be."""
+    """The best movement at the speed asked for; where that isn't found, evenly as much slower as
+    may be.
+    """
     try:
         return _best_at(asked, layers)
     except PathRefusedError as error:
@@ -118,7 +120,7 @@ _STEPS = (1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
 
 
 def _best_at(asked: ToolPathRequest, layers: Layers) -> DrivenPath:
-    """The same at one speed. Raises PathRefusedError."""
+    """The best movement at one speed. Raises PathRefusedError."""
     reason: PathRefusedError | None = None
     journal = asked.context.journal
     for _ in range(_ROUNDS):

@@ -76,7 +76,7 @@ class Line:
 
     @property
     def breaks(self) -> FloatArray:
-        """Both ends."""
+        """Both ends (2,) [m]."""
         return np.array([0.0, self.length])
 
     def at(self, s: FloatArray) -> FloatArray:
@@ -111,7 +111,7 @@ class Still:
 
     @property
     def breaks(self) -> FloatArray:
-        """Both ends."""
+        """Both ends (2,) [m]."""
         return np.array([0.0, self.length])
 
     def at(self, s: FloatArray) -> FloatArray:
@@ -141,12 +141,12 @@ class Arc:
 
     @property
     def curvature(self) -> float:
-        """The same all along [1/m]."""
+        """That of the circle, all along [1/m]."""
         return 1.0 / float(portable.norm(self.radius))
 
     @property
     def breaks(self) -> FloatArray:
-        """Both ends."""
+        """Both ends (2,) [m]."""
         return np.array([0.0, self.length])
 
     def at(self, s: FloatArray) -> FloatArray:
@@ -210,7 +210,7 @@ class Through:
 
     @property
     def breaks(self) -> FloatArray:
-        """Arc lengths of the spline's knots."""
+        """Arc lengths (K,) of the spline's knots [m]."""
         return self._arc.of(np.unique(self._curve.t))
 
     @cached_property

@@ -78,7 +78,7 @@ class TimedStroke:
         return float(self.at(np.array([self.law.total])).t[0])
 
     def stretched(self, factor: float) -> TimedStroke:
-        """The same, slower by `factor`."""
+        """The stroke, slower by `factor`."""
         law = self.law
         slower = SpeedLaw(law.duration * factor, law.first / factor, law.last / factor, law.even)
         if self.slowness is None:
@@ -143,7 +143,9 @@ def fitting(
     limits: MotionLimits,
     scene: PlanningScene,
 ) -> tuple[tuple[StrokeSpan, ...], FloatArray]:
-    """Spans and ramps that fit into them. Raises PathRefusedError."""
+    """The K spans, slower within `tolerance` (a share of the speed) where need be, and ramps
+    (K + 1,) [s] between their speeds that fit into them. Raises PathRefusedError where none do.
+    """
     for slow, used in ((True, USED), (True, _USED_AT_MOST)):
         ramps = ramps_of(curve, spans, limits, scene, slow=slow, used=used)
         with suppress(TooShortError):

@@ -150,7 +150,9 @@ def with_speed(
     a: FloatArray,
     j: FloatArray,
 ) -> DrivenMotion:
-    """The same from q and its derivatives by s (M, n)."""
+    """The motion at times t (M,) [s] by the chain rule: s (M,) [m] moves at speed v, acceleration a
+    and jerk j (M,); along: q and its three derivatives by s, each (M, n).
+    """
     q, first, second, third = along
     v1 = v[:, None]
     a1 = a[:, None]

@@ -56,7 +56,9 @@ def sampled_energy(at: Sampled, scene: PlanningScene) -> float:
 
 
 def energy_and_slope(at: Sampled, scene: PlanningScene) -> tuple[float, FloatArray]:
-    """The same, and d energy / d parameter (P,) with the loads of the scene, J per unit."""
+    """Energy [J] at the mains with the loads of the scene, and d energy / d parameter (P,), J per
+    unit.
+    """
     if at.span <= 0.0:
         return 0.0, np.zeros(len(scene.parameters.names))
     torque, power, bus = _powers(at, scene)
@@ -204,7 +206,7 @@ def expected(parameters: PowerParameters) -> PowerParameters:
 
 @lru_cache(maxsize=64)
 def expected_scene(scene: PlanningScene) -> PlanningScene:
-    """The same scene with the mean of the drawn robots."""
+    """The scene with the mean of the drawn robots."""
     mean = expected(scene.parameters)
     drives = replace(scene.drives, parameters=mean)
     return replace(scene, drives=drives, power=mean.power_with(scene.power))

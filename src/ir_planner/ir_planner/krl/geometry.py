@@ -110,7 +110,7 @@ class Arm:
         return np.asarray(self.tool_poses(target, q[None])[0])
 
     def tool_poses(self, target: Target, q: FloatArray) -> FloatArray:
-        """The same (N, 4, 4) of q (N, n)."""
+        """Poses (N, 4, 4) [m] of the tool, as `tool_pose`, at q (N, n)."""
         return target.pose(self.flange(q))
 
     def pose(self, target: Target, now: FloatArray) -> FloatArray:

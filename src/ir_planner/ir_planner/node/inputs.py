@@ -64,9 +64,10 @@ class LastState:
     _lock: Lock = field(default_factory=Lock)
 
     def take(self, q: FloatArray, now: float, velocity: FloatArray | None = None) -> None:
-        """A state came; velocity None: it has none. It is kept to MEASURED decimals: a robot that
-        stands is one start, not a new one with every measurement, so the same request gives the
-        same trajectory.
+        """Keep a state q (n,) [rad] that came at `now` [s]; velocity (n,) [rad/s], None: not known.
+
+        It is kept to MEASURED decimals: a robot that stands is one start, not a new one with every
+        measurement, so the same request gives the same trajectory.
         """
         with self._lock:
             # + 0.0: no negative zeros
@@ -112,8 +113,8 @@ class LastState:
         return self.fresh(now(), max_age, joints_at_rest)
 
     def fresh(self, now: float, max_age: float, joints_at_rest: tuple[str, ...] = ()) -> FloatArray:
-        """The same where it must not be older: raises RequestError when there is none, or an old
-        one.
+        """Positions (n,) of a state that is at most max_age [s] old. Raises RequestError when there
+        is none, or an older one.
         """
         q = self.known(now, max_age, joints_at_rest)
         if q is None:

@@ -337,7 +337,7 @@ class Requests:
         response: OptimizeTrajectory.Response,
         cancelled: Gone = _NEVER,
     ) -> Status:
-        """The same end points for less."""
+        """A trajectory between the same end points that costs less."""
         options = options_of(request.options, self.draw_seed)
         plan = self.planner.optimize_trajectory(
             trajectory_of(request, self.planner), options=options, cancelled=cancelled

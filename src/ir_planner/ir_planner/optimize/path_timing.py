@@ -81,7 +81,7 @@ class FixedPath:
         return np.asarray(np.interp(np.linspace(0.0, 1.0, count + 1)[2:-2], self._share, self._s))
 
     def finer(self, s: FloatArray) -> FloatArray:
-        """The same speed profile with a knot more in every interval."""
+        """Path parameters (C,) of the same speed profile with a knot more in every interval."""
         knots = np.concatenate([[0.0], np.arange(2.0, len(s) + 2.0), [len(s) + 3.0]])
         profile = portable.interpolating_spline(knots, np.concatenate([[0.0], s, [1.0]]))
         return np.clip(profile(np.arange(2.0, 2.0 * len(s) + 5.0) / 2.0), 0.0, 1.0)
@@ -95,7 +95,9 @@ class FixedPath:
         return np.asarray(np.interp(self._passed[1:-1], rising, knots))
 
     def spline(self, s: FloatArray, duration: float) -> UniformSpline:
-        """The spline that passes p(s) at its inner knots, at rest at both ends."""
+        """The spline that passes p(s), s (C,), at its inner knots, at rest at both ends, in
+        `duration` [s].
+        """
         inner = self.at(s)
         right = 6.0 * inner
         right[0] -= self.q[0]
@@ -213,7 +215,7 @@ class Passing:
 
     @staticmethod
     def nothing(points: FloatArray) -> "Passing":
-        """No point needs to be passed."""
+        """For points (M, n) of which none needs to be passed."""
         return Passing(np.zeros(0), points[:0])
 
     @staticmethod

@@ -176,7 +176,7 @@ class Portfolio:
         return sum(self._take(candidate) for candidate in found)
 
     def _further(self, looks: list[Look], evaluations: int) -> list[Look]:
-        """The same after a descent more."""
+        """The looks after one more descent each."""
         coarse = self.refinement.coarse_from
         return [(coarse(solution.spline, guess, evaluations), guess) for solution, guess in looks]
 

@@ -252,7 +252,7 @@ class Choice:
         return [part for hop in parts_of(self.chain, self.movements) for part in hop]
 
     def along(self, chain: StationChain) -> "Choice":
-        """The same with another chain."""
+        """The choice with another chain."""
         return replace(self, chain=chain)
 
     def found(self, progress: Progress) -> dict[HopPart, Movement]:

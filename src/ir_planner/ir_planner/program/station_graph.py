@@ -113,7 +113,7 @@ class StationChain:
 
     @property
     def proved_gap(self) -> float:
-        """The same by bounds that are proved alone."""
+        """The gap by those bounds alone that are proved."""
         return self._above(self.proved)
 
     def _above(self, bound: float) -> float:

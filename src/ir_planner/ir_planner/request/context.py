@@ -264,13 +264,13 @@ class Context:
         return replace(self, options=asked)
 
     def upright_from(self, start: FloatArray) -> "Context":
-        """The same with the axis named whose tilt counts on a movement from start (n,)."""
+        """The context with the axis named whose tilt counts on a movement from start (n,)."""
         if self.options.tilt_max == NO_TILT:
             return self
         return replace(self, options=upright_options(self.options, self.scene, start))
 
     def leaning_freely(self) -> "Context":
-        """The same without a bound of the tool's tilt."""
+        """The context without a bound of the tool's tilt."""
         return replace(self, options=_leaning_freely(self.options))
 
     @property
@@ -281,7 +281,9 @@ class Context:
         return not self.motion[0].any(), not self.motion[1].any()
 
     def in_motion(self, motion: FloatArray | None) -> "Context":
-        """The same with qd, qdd, motion (2, 2, n), at start and goal; None: at rest."""
+        """The context of a movement with motion (2, 2, n) at its ends: qd [rad/s] and qdd
+        [rad/s^2] at start and goal; None: at rest.
+        """
         return replace(self, motion=motion)
 
     def thresholds(self) -> FloatArray:
@@ -289,7 +291,7 @@ class Context:
         return self.scene.thresholds(self.safety_distance, self.station)
 
     def asking(self, objective: str, duration: float = 0.0) -> "Context":
-        """The same with another objective and requested duration [s], 0: free."""
+        """The context with another objective and requested duration [s], 0: free."""
         return replace(self, options=replace(self.options, objective=objective, duration=duration))
 
     def valuing_time(self, times: float) -> "Context":
@@ -301,7 +303,7 @@ class Context:
         return replace(self, options=options)
 
     def planned_by(self, planner_id: str) -> "Context":
-        """The same asking for another search."""
+        """The context that asks for another search."""
         return replace(self, options=replace(self.options, planner_id=planner_id))
 
     def with_timing(self, timing: str) -> "Context":
@@ -309,9 +311,9 @@ class Context:
         return replace(self, options=replace(self.options, timing=timing))
 
     def at(self, station: str) -> "Context":
-        """The same with the allowed contacts of a station."""
+        """The context with the allowed contacts of a station."""
         return replace(self, station=station)
 
     def inside(self, scene: PlanningScene) -> "Context":
-        """The same in another scene of the request: other loads, other places of the parts."""
+        """The context in another scene of the request: other loads, other places of the parts."""
         return replace(self, scene=scene)

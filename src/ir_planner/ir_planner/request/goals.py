@@ -130,7 +130,7 @@ def _pose(values: list[float]) -> FloatArray:
 
 
 def joint_values(q: ArrayLike, shape: tuple[int, ...], what: str, code: StatusCode) -> FloatArray:
-    """Numbers of this shape. Raises RequestError."""
+    """Numbers of this shape. Raises RequestError with this code, which names `what`."""
     try:
         values = np.asarray(q, dtype=np.float64)
     except (TypeError, ValueError) as error:

@@ -298,7 +298,7 @@ class _Group:
         return _Group(one, other, self.first | group.first)
 
     def zone(self, robots: tuple[int, int], counts: tuple[int, int]) -> ExclusiveZone:
-        """The same in movements."""
+        """The zone in movements of the two robots instead of groups."""
         stretches = [
             ZoneStretch(robot, span[0] // 2, min((span[1] + span[0] % 2 + 1) // 2, count))
             for robot, span, count in zip(robots, (self.one, self.other), counts, strict=True)

@@ -394,7 +394,7 @@ def _passed(stretch: ZoneStretch, cycle: JointCycle, count: int) -> tuple[float,
 
 
 def _on_motors(work: ArmWork) -> ArmWork:
-    """The same with motors on in every wait, however long."""
+    """The work of a robot with motors on in every wait, however long."""
     modes = tuple(
         tuple(WaitMode(MOTORS, 0.0, _FOREVER, 0.0, mode.watts) for mode in own[:1])
         for own in work.modes

@@ -62,7 +62,7 @@ class ToolCone:
         return np.asarray(portable.matmul(self.chain.tcp[:3, :3], self.axis))
 
     def within(self, most: float) -> "ToolCone":
-        """The same with another largest tilt [rad]."""
+        """The cone with another largest tilt [rad]."""
         return ToolCone(self.chain, self.axis, self.direction, most)
 
     def tilts(self, q: FloatArray) -> FloatArray:
@@ -205,7 +205,7 @@ class ToolCone:
         first: FloatArray,
         last: FloatArray,
     ) -> tuple[IntArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-        """The same intervals in parts."""
+        """The intervals divided into parts."""
         shares = np.arange(1, _PARTS) / _PARTS
         inner = begin[:, None] + shares * (end - begin)[:, None]
         owner = np.repeat(piece, _PARTS - 1)

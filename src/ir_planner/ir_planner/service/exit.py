@@ -42,7 +42,7 @@ class WorkArea:
 
     @staticmethod
     def built(scene: PlanningScene, station: Station) -> "WorkArea":
-        """The same, built anew."""
+        """The work area of a station, computed anew; `of` remembers."""
         machine = scene.cell.machine(station.equipment)
         if not machine.enabled:
             return WorkArea(scene, station, None, None, None)

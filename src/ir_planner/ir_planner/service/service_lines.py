@@ -49,13 +49,13 @@ class ServiceLine:
 
     @property
     def interaction(self) -> FloatArray:
-        """At the station."""
+        """Configuration (n,) at the station."""
         first: FloatArray = self.points[0]
         return first
 
     @property
     def outside(self) -> FloatArray:
-        """At the outer end."""
+        """Configuration (n,) at the outer end."""
         last: FloatArray = self.points[-1]
         return last
 

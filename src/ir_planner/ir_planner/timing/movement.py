@@ -204,15 +204,15 @@ class Movement:
         return coarse_energy_cost(self.trajectory, self.context)
 
     def passing(self, path: FloatArray) -> "Movement":
-        """The same trajectory with other waypoints (M, n)."""
+        """The movement with other waypoints (M, n) [rad], its trajectory as it is."""
         return replace(self, path=path, known=self.proofs)
 
     def asked_by(self, context: Context) -> "Movement":
-        """The same at its station for another request."""
+        """The movement at its station for another request."""
         return replace(self, context=context.at(self.context.station), known=self.proofs)
 
     def stretched_by(self, factor: float) -> "Movement":
-        """The same path, slower by `factor` >= 1."""
+        """The movement along its path, slower by `factor` >= 1."""
         return replace(self, trajectory=stretched(self.trajectory, factor))
 
 

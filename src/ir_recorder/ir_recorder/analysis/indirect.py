@@ -57,7 +57,7 @@ class IndirectMeter:
         return self._by(self._model, start, end, loads)
 
     def second_opinion(self, start: float, end: float, loads: tuple[Load, ...]) -> float:
-        """The same with torques by Pinocchio; NaN where it isn't installed."""
+        """Energy [J] with torques by Pinocchio; NaN where it isn't installed."""
         return self._by(self._second, start, end, loads) if available() else NAN
 
     def _by(self, model: PowerModel, start: float, end: float, loads: tuple[Load, ...]) -> float:
@@ -85,7 +85,7 @@ class IndirectMeter:
         return {name: positions[:, k].copy() for k, name in enumerate(self._joints.names)}
 
     def from_torques(self, start: float, end: float, loads: tuple[Load, ...]) -> float:
-        """The same from recorded speed and torque; NaN where they weren't recorded."""
+        """Energy [J] from recorded speed and torque; NaN where they weren't recorded."""
         joints = self._joints
         of = self._parameters.axis
         inside = (joints.time >= start - 1e-9) & (joints.time < end - 1e-9)

@@ -59,7 +59,7 @@ class Amount:
     high: float
 
     def of(self, unit: Callable[[float], float]) -> Amount:
-        """The same in another unit."""
+        """The amount in another unit."""
         return Amount(unit(self.value), unit(self.low), unit(self.high))
 
     def times(self, count: float) -> Amount:

@@ -232,7 +232,7 @@ class DataSource:
         return read_recording(self.motion) if self.motion.suffix.lower() == ".mcap" else None
 
     def on_clock(self, seconds: float) -> DataSource:
-        """The same with so much added to the meter's clock."""
+        """The source with so many seconds added to the meter's clock."""
         mapping = self.meter_mapping or TraceMapping()
         return replace(self, meter_mapping=replace(mapping, clock_offset=seconds))
 

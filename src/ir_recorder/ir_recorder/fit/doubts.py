@@ -372,7 +372,7 @@ class _Reading:
         )
 
     def fitted(self) -> float:
-        """The same of the best parameters, with what is known of them."""
+        """Cost of the best parameters, with what is known of them."""
         return min(self._own.least_cost(start, self._weight, self._wide) for start in self._starts)
 
 

@@ -91,7 +91,7 @@ class Trace:
         )
 
     def shifted(self, offset: float) -> Trace:
-        """The same on another clock: `offset` [s] is added to the time."""
+        """The trace on another clock: `offset` [s] is added to the time."""
         return Trace(
             self.source, self.time + offset, self.columns, self.texts, self.problems, self.sampled
         )

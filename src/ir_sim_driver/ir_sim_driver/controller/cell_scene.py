@@ -101,7 +101,7 @@ class MachinesInScene:
         return (self._states[machine.name], *(() if ahead is None else ahead[:1]))
 
     def present_states(self) -> dict[str, tuple[str, ...]]:
-        """The same of all machines, by name."""
+        """Present states of all machines, by name."""
         return {machine.name: self.present(machine) for machine in self.cell.equipment}
 
     def states(self, now: float) -> tuple[MachineState, ...]:
@@ -341,7 +341,7 @@ class ContactScene:
         return self._reach_of(_ends(self.capsules))
 
     def _reach_of(self, points: Iterable[tuple[int, float]]) -> FloatArray:
-        """The same for points on links, so far [m] from their frames."""
+        """Reach for points on links, so far [m] from their frames."""
         robot = self.cell.robot
         offsets = np.linalg.norm(np.array(robot.joint_origin)[:, :3, 3], axis=1)
         result = np.zeros(robot.n)

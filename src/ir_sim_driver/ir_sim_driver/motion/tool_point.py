@@ -23,7 +23,7 @@ class ToolPoint:
         self.stand_at(base_pose, tcp)
 
     def stand_at(self, base_pose: FloatArray, tcp: FloatArray) -> None:
-        """Stand elsewhere from now on, or hold another tcp."""
+        """Base (4, 4) in the cell and tcp (4, 4) in the flange from now on."""
         robot = self._robot
         self.chain = Chain(robot, base_pose, tcp)
         arms = np.linalg.norm(np.array(robot.joint_origin)[1:, :3, 3], axis=1)

@@ -131,7 +131,7 @@ class ServoControl:
         self._model = DynamicsModel(self._bare, tuple(loads), self._base_pose)
 
     def reset(self, q: FloatArray) -> None:
-        """Start over with a command that stands at q."""
+        """Start over with a command that stands at q (n,) [rad]."""
         self.command: FloatArray = q.copy()
         self._rows[_KEPT] = 0.0
         self._rows[_KEPT][:2] = self._encoders(q), q

@@ -41,7 +41,7 @@ class IdealBackend:
         """Nothing is held."""
 
     def reset(self, q: FloatArray) -> None:
-        """Stand still at q."""
+        """Stand still at q (n,) [rad]."""
         self._settle()
         self.q: FloatArray = np.array(q, dtype=np.float64)
         self._before: FloatArray = self.q  # one and two steps ago
@@ -60,7 +60,7 @@ class IdealBackend:
 
     @property
     def qd(self) -> FloatArray:
-        """Speed now: the last difference and half of its change."""
+        """Speed (n,) [rad/s] now: the last difference and half of its change."""
         last = self.q - self._before
         before = self._before - self._earlier
         return (1.5 / self._dt) * last - (0.5 / self._dt) * before
@@ -78,7 +78,7 @@ class IdealBackend:
         return bool(np.abs(self.q - self._before).max() < STANDING * self._dt)
 
     def track(self, q_next: FloatArray) -> None:
-        """Be at q_next after the step."""
+        """Be at q_next (n,) [rad] after the step."""
         self._go(q_next, True)
 
     def coast(self) -> None:
@@ -105,7 +105,7 @@ class IdealBackend:
 
     @property
     def torque(self) -> FloatArray:
-        """Motor torque of the last step."""
+        """Motor torque (n,) [Nm at the joint] of the last step."""
         self._settle()
         return self._last
 

@@ -430,7 +430,7 @@ class PyBulletBackend:
         return self._gears.temperature
 
     def reset(self, q: FloatArray) -> None:
-        """Stand still at q; starts the physics server again when it is gone."""
+        """Stand still at q (n,) [rad]; starts the physics server again when it is gone."""
         self._arm.connect_again()
         self._be(np.array(q, dtype=np.float64))
         self._servo.reset(self.q)
@@ -445,7 +445,7 @@ class PyBulletBackend:
         self._write()
 
     def track(self, q_next: FloatArray) -> None:
-        """Follow the command with the torque that the envelope allows."""
+        """Follow the command q_next (n,) [rad] with the torque that the envelope allows."""
         if self._stale:
             self._write()
         self.torque, self.saturated = self._servo.torque(q_next, self.q)
