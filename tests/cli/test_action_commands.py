@@ -59,7 +59,7 @@ class Machine:
 @pytest.fixture
 def ros_discovery_range() -> str:
     """The commands have a participant of their own, which has to find the machine."""
-    return "LOCALHOST"
+    return "SYSTEM_DEFAULT"
 
 
 @pytest.fixture

@@ -50,7 +50,7 @@ class Planner:
 @pytest.fixture
 def ros_discovery_range() -> str:
     """The command has a participant of its own, which has to find the planner."""
-    return "LOCALHOST"
+    return "SYSTEM_DEFAULT"
 
 
 @pytest.fixture

@@ -41,7 +41,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def environment(site: Path) -> dict[str, str]:
     """Of a process that finds the package and only nodes of this host."""
     path = os.pathsep.join([str(site), os.environ.get("PYTHONPATH", "")])
-    found = {**os.environ, "PYTHONPATH": path, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    found = {**os.environ, "PYTHONPATH": path, "ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}
     return {**found, "ROS_DOMAIN_ID": str(own_domain())}
 
 

@@ -193,7 +193,7 @@ def test_what_makes_no_sense_is_refused_before_anything_starts(
 @pytest.fixture
 def ros_discovery_range() -> str:
     """The command looks from a context of its own."""
-    return "LOCALHOST"
+    return "SYSTEM_DEFAULT"
 
 
 def test_nodes_that_are_there_already_are_listed(ros_context, ros_executor, monkeypatch) -> None:

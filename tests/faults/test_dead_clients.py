@@ -24,7 +24,7 @@ from ir_sim_driver.node.trajectory_actions import ClientWatch
 @pytest.fixture
 def ros_discovery_range() -> str:
     """Two contexts meet."""
-    return "LOCALHOST"
+    return "SYSTEM_DEFAULT"
 
 
 def long_movement() -> JointTrajectory:

@@ -107,7 +107,9 @@ def client(cell, ros_context, monkeypatch):
 class TestOnAContextOfItsOwn:
     @pytest.fixture
     def ros_discovery_range(self):
-        return "LOCALHOST"  # two contexts are two participants: without discovery they never meet
+        return (
+            "SYSTEM_DEFAULT"  # two contexts are two participants: without discovery they never meet
+        )
 
     def test_the_cell_is_found(self, cell, ros_domain_id):
         with Client(domain_id=ros_domain_id, timeout=PATIENCE) as client:

@@ -118,7 +118,7 @@ def resident(pid: int) -> int:
     return int(status.partition("VmRSS:")[2].split()[0]) // 1024
 
 
-@pytest.mark.parametrize("ros_discovery_range", ["LOCALHOST"])
+@pytest.mark.parametrize("ros_discovery_range", ["SYSTEM_DEFAULT"])
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
 def test_the_memory_of_large_requests_is_given_back(
     ros_executor: Any, ros_node: Any, wait_for: Any, ros_domain_id: int

@@ -26,7 +26,7 @@ RELEASED = PlcInputs(move_enable=True)
 @pytest.fixture
 def ros_discovery_range() -> str:
     """They are found."""
-    return "LOCALHOST"
+    return "SYSTEM_DEFAULT"
 
 
 @pytest.mark.parametrize(

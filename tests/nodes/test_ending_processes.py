@@ -54,7 +54,7 @@ def recording(tmp_path_factory):
 
 @pytest.fixture
 def watcher(monkeypatch):
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SYSTEM_DEFAULT")
     context = Context()
     rclpy.init(context=context)
     node = Node("watcher", context=context)

@@ -29,7 +29,7 @@ TOPICS = (names.POWER_STATE, names.CELL, names.PLC_INPUTS, names.CARRIED_LOAD)
 
 @pytest.fixture
 def ros_discovery_range() -> str:
-    return "LOCALHOST"
+    return "SYSTEM_DEFAULT"
 
 
 @pytest.fixture

@@ -431,7 +431,7 @@ def test_ir_record_ends_with_1_when_the_disk_is_full(
     path = tmp_path / "full.mcap"
     environment = {
         **os.environ,
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT",
         "ROS_DOMAIN_ID": str(ros_domain_id),
     }
     command = [

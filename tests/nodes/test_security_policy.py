@@ -96,7 +96,7 @@ def test_the_installed_policy_is_what_the_names_say_and_has_the_form_of_the_sche
 @pytest.fixture
 def ros_discovery_range() -> str:
     """The driver's other participants are found."""
-    return "LOCALHOST"
+    return "SYSTEM_DEFAULT"
 
 
 @pytest.fixture

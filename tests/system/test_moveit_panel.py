@@ -55,7 +55,7 @@ NODES = {
 @pytest.fixture
 def ros_discovery_range() -> str:
     """The nodes are other processes of this machine."""
-    return "LOCALHOST"
+    return "SYSTEM_DEFAULT"
 
 
 @pytest.fixture

@@ -2,9 +2,8 @@
 
 IR_NETWORK chooses, whatever starts the node:
 
-    loopback   (or unset) this host only: discovery and transport are bound to 127.0.0.1 and shared
-    memory secure     as ROS's own variables say, with DDS security enforced
-    (ROS_SECURITY_ENABLE=true and
+    loopback   (or unset) this host only: discovery and transport are bound to 127.0.0.1
+    secure     as ROS's own variables say, with DDS security enforced (ROS_SECURITY_ENABLE=true and
                ROS_SECURITY_STRATEGY=Enforce); a build without security then refuses to start
     insecure   as ROS's own variables say: whoever reaches the network can command the robot
 
@@ -33,7 +32,12 @@ BY_PROFILE = "RMW_FASTRTPS_USE_QOS_FROM_XML"
 that ever waited, the memory of the largest.
 """
 _SECURITY = {"ROS_SECURITY_ENABLE": "true", "ROS_SECURITY_STRATEGY": "Enforce"}
-_NARROW = ("LOCALHOST", "OFF")
+OFF = "OFF"
+BY_PROFILE_ALONE = "SYSTEM_DEFAULT"
+"""The range that leaves discovery to the profile: every other one adds shared memory."""
+LOCALHOST = "LOCALHOST"
+MIDDLEWARE = "RMW_IMPLEMENTATION"
+FAST_DDS = "rmw_fastrtps"
 
 
 def profile(name: str) -> str:
@@ -56,9 +60,10 @@ def network_variables(environment: Mapping[str, str]) -> tuple[dict[str, str], t
     if choice not in CHOICES:
         raise InvalidValueError(f"{VARIABLE} is {choice[:60]!a}: known are {', '.join(CHOICES)}")
     if choice == "loopback":
-        narrow = environment.get(RANGE, "").upper()
+        fast_dds = (environment.get(MIDDLEWARE) or FAST_DDS).startswith(FAST_DDS)
+        here = BY_PROFILE_ALONE if fast_dds else LOCALHOST
         return {
-            RANGE: narrow if narrow in _NARROW else "LOCALHOST",
+            RANGE: OFF if _range(environment) == OFF else here,
             PROFILES: profile("loopback"),
             BY_PROFILE: "1",
         }, (PEERS,)
@@ -80,10 +85,7 @@ def apply_network(environment: MutableMapping[str, str] = os.environ) -> None:
     """
     wanted, removed = network_variables(environment)
     ignored = [f"{PEERS}={environment[PEERS]}" for name in removed if environment.get(name)]
-    if (
-        environment.get(RANGE, "").upper() not in ("", "SYSTEM_DEFAULT", *_NARROW)
-        and RANGE in wanted
-    ):
+    if RANGE in wanted and _range(environment) not in ("", BY_PROFILE_ALONE, LOCALHOST, OFF):
         ignored.append(f"{RANGE}={environment[RANGE]}")
     if ignored:
         sys.stderr.write(
@@ -93,3 +95,8 @@ def apply_network(environment: MutableMapping[str, str] = os.environ) -> None:
     environment.update(wanted)
     for name in removed:
         environment.pop(name, None)
+
+
+def _range(environment: Mapping[str, str]) -> str:
+    """The range of discovery that somebody chose; "" without a choice."""
+    return environment.get(RANGE, "").upper()

@@ -3,7 +3,7 @@ waiting.
 
 A pytest plugin (entry point `ir_msgs_py`); every test is alone on its context, and without
 discovery, so tests run in parallel. A test over processes overrides `ros_discovery_range` with
-"LOCALHOST".
+"SYSTEM_DEFAULT".
 
     def test_my_node_answers(ros_context, ros_executor, ros_node, wait_for):
         ros_executor.add_node(MyNode(context=ros_context))
