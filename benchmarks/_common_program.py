@@ -17,7 +17,7 @@ from _program_chains import Chains
 
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Goal, Planner
-from ir_planner.program.stops import StopNode
+from ir_planner.program.stop_nodes import StopNode
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from ir_description import (
 from ir_description.robot import centre_deviations, without_table
 from ir_recorder.errors import RecorderError
 from ir_recorder.fit import doubts, fit_sources, left_out, recommendation
-from ir_recorder.fit.data import DataSource
+from ir_recorder.fit.fit_data import DataSource
 from ir_recorder.measure import PowerModel, movements
 from ir_recorder.traces import TraceMapping
 from ir_values.arrays import FloatArray

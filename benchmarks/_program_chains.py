@@ -20,7 +20,7 @@ from ir_msgs_py.report import TrajectoryReport
 from ir_planner import Goal, Planner, TimingError
 from ir_planner.program.chain import layers_of
 from ir_planner.program.steps import Route, Scenes, placed_steps, steps_of
-from ir_planner.program.stops import StopNode
+from ir_planner.program.stop_nodes import StopNode
 from ir_planner.request import Context, Journal, Work
 from ir_planner.scene import PlanningScene
 from ir_planner.service import exit_searches, timed_service

@@ -40,7 +40,7 @@ from ir_recorder.fit import (
     result,
     shaft_work,
 )
-from ir_recorder.fit.data import without_turns
+from ir_recorder.fit.fit_data import without_turns
 from ir_recorder.measure import PowerModel, Samples, movements, samples_of
 from ir_recorder.measure.arm import available
 from ir_recorder.traces import Trace, read_traces

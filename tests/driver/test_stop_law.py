@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from ir_msgs_py.modes import READY, Mode
-from ir_msgs_py.stops import before_first_stop
+from ir_msgs_py.stop_numbers import before_first_stop
 from ir_sim_driver.emergency_stop import StopState
 
 sys.path.insert(0, str(Path(__file__).parent))  # benchmarks/hostile.py reads this file too

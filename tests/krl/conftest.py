@@ -39,4 +39,4 @@ def home(planner: Planner) -> np.ndarray:
 @pytest.fixture(autouse=True)
 def few_statements(monkeypatch: pytest.MonkeyPatch) -> None:
     """A loop that never ends is named sooner."""
-    monkeypatch.setattr("ir_krl.run.control.STATEMENTS_MAX", 5_000)
+    monkeypatch.setattr("ir_krl.run.control_flow.STATEMENTS_MAX", 5_000)

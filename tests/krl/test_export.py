@@ -30,7 +30,7 @@ from ir_krl.write import (
     tool_numbers,
     written,
 )
-from ir_krl.write.names import SignalNames
+from ir_krl.write.identifiers import SignalNames
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_planner import Planner, RequestError

@@ -15,7 +15,7 @@ from ir_description import cell_from_yaml, cell_to_yaml, load_cell
 from ir_krl import Followed, KrlError, follow, parse
 from ir_krl.run import Payload
 from ir_krl.write import Numbers
-from ir_krl.write.names import Wiring
+from ir_krl.write.identifiers import Wiring
 from ir_planner import Planner, RequestError
 from ir_planner.before_after import before_after, today_of_krl
 from ir_planner.checks import evaluate_trajectory

@@ -25,7 +25,7 @@ from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.status import StatusCode
-from ir_msgs_py.stops import same_driver
+from ir_msgs_py.stop_numbers import same_driver
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.controller.mains import Mains
 from ir_sim_driver.node import SimDriver, topics

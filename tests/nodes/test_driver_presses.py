@@ -16,7 +16,7 @@ from ir_msgs_py import names
 from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.ros.topics import LATCHED
-from ir_msgs_py.stops import stop_count
+from ir_msgs_py.stop_numbers import stop_count
 from ir_sim_driver.node import SimDriver
 
 PRESSED = PlcInputs(emergency_stop=True, move_enable=True)

@@ -32,8 +32,8 @@ from ir_msgs_py.status import StatusCode
 from ir_recorder.errors import ReadError, RecorderError, WriteError
 from ir_recorder.node.recorder import COMMAND_NODE, POLL_PERIOD, RecorderNode
 from ir_recorder.reading.mcap_file import read_raw
+from ir_recorder.recording.cell_topics import GLOBAL
 from ir_recorder.recording.settings import RecorderSettings
-from ir_recorder.recording.topics import GLOBAL
 from ir_recorder.recording.worker import FLUSH_PERIOD
 from ir_recorder.recording.writer import RecordingWriter
 

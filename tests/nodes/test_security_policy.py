@@ -23,7 +23,7 @@ from ir_planner.node.node import PlannerNode
 from ir_program_runner.node import ProgramRunnerNode
 from ir_recorder.live.node import LiveNode
 from ir_recorder.node.recorder import RecorderNode
-from ir_recorder.recording.topics import TopicSelection
+from ir_recorder.recording.cell_topics import TopicSelection
 from ir_sim_driver.node import SimDriver
 from ir_studies.node import StudiesNode
 

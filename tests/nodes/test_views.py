@@ -27,7 +27,7 @@ from ir_msgs_py.names import WORLD_FRAME
 from ir_msgs_py.ros.messages import interface_type
 from ir_planner.node.node import PlannerNode
 from ir_program_runner.node import ProgramRunnerNode
-from ir_recorder.recording.topics import TopicSelection
+from ir_recorder.recording.cell_topics import TopicSelection
 from ir_sim_driver.node import SimDriver
 
 BRINGUP = Path(__file__).resolve().parents[2] / "ros_ws" / "src" / "ir_bringup"

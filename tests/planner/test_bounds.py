@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from ir_description import load_cell, load_power_data
 from ir_msgs_py.options import PlanOptions
 from ir_planner.checks.evaluation import evaluate_trajectory
-from ir_planner.program.bounds import (
+from ir_planner.program.cost_bounds import (
     MARGIN,
     CoarseCost,
     Rates,

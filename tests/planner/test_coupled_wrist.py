@@ -16,7 +16,7 @@ from ir_msgs_py.options import PlanOptions
 from ir_planner import Goal, MovementPlan, Planner
 from ir_planner.checks import movement_energy
 from ir_planner.checks.intervals import Sampled, energy_and_slope
-from ir_planner.program.bounds import Rates, least_cost
+from ir_planner.program.cost_bounds import Rates, least_cost
 from ir_planner.request import Context, Work
 from ir_planner.scene import Drives
 from ir_planner.timing import baseline

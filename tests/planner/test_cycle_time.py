@@ -20,7 +20,7 @@ from ir_msgs_py.options import PlanOptions
 from ir_planner import Planner
 from ir_planner.checks import Consumption
 from ir_planner.errors import RequestError
-from ir_planner.program.bounds import Rates
+from ir_planner.program.cost_bounds import Rates
 from ir_planner.program.cycle_time import CycleTask, shared_out
 from ir_planner.program.movement_fronts import (
     FASTEST,

@@ -17,9 +17,9 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.free_space import FreeSpace, too_near
 from ir_planner.errors import RequestError
 from ir_planner.planner import Planner
-from ir_planner.request.bounds import PLANNING_TIME_MAX
 from ir_planner.request.context import Context, Journal, Work
 from ir_planner.request.goals import Goal, parse_goal
+from ir_planner.request.request_bounds import PLANNING_TIME_MAX
 from ir_planner.scene.planning_scene import scene_with, with_parts
 from ir_planner.service.service_lines import line_poses, service_lines
 from ir_planner.store import trajectory_store

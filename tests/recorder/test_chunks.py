@@ -13,7 +13,7 @@ from mcap.writer import CompressionType, Writer
 
 from ir_recorder.errors import ReadError
 from ir_recorder.format.schemas import MOST_DEPTH, definitions_of
-from ir_recorder.reading.limits import MOST_RECORDS, ChunkReader, ReadLimits
+from ir_recorder.reading.chunk_limits import MOST_RECORDS, ChunkReader, ReadLimits
 from ir_recorder.reading.mcap_file import read_raw
 from ir_recorder.reading.reader import read_recording
 
@@ -153,7 +153,7 @@ def test_a_chunk_of_very_many_records_is_not_opened() -> None:
 def test_records_that_cost_nothing_in_the_file_end_at_a_bound(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("ir_recorder.reading.limits.MOST_CHEAP", 10_000)
+    monkeypatch.setattr("ir_recorder.reading.chunk_limits.MOST_CHEAP", 10_000)
     data = (b"\x05" + (22).to_bytes(8, "little") + bytes(22)) * 6_000
     small = zstandard.compress(data)
     assert len(small) < 1_000

@@ -21,8 +21,8 @@ from ir_description.library import load_power_parameters
 from ir_description.robot import physical_bounds
 from ir_recorder.errors import RecorderError
 from ir_recorder.fit import DataSource, Fit, fit, fit_data, sentences
-from ir_recorder.fit.data import check_range, check_readings, check_speed
-from ir_recorder.fit.estimate import by_window
+from ir_recorder.fit.fit_data import check_range, check_readings, check_speed
+from ir_recorder.fit.power_estimate import by_window
 from ir_recorder.measure import PowerModel, Samples, movements
 from ir_recorder.traces import Trace
 

@@ -14,7 +14,7 @@ import pytest
 from ir_description import PowerParameters, RobotModel, data_sheet_of, load_cell, load_robot
 from ir_recorder.errors import RecorderError
 from ir_recorder.fit import Estimate, LeftOut, doubts, fit, left_out, recommendation, shaft_work
-from ir_recorder.fit.data import DataSource, fit_data, without_turns
+from ir_recorder.fit.fit_data import DataSource, fit_data, without_turns
 from ir_recorder.measure import PowerModel, Samples, samples_of
 from ir_recorder.measure.arm import arm_torques
 from ir_recorder.traces import Trace

@@ -6,7 +6,7 @@ from typing import Any
 
 from rclpy.task import Future
 
-from ir_recorder.node.requests import PATIENCE, RepeatedRequest
+from ir_recorder.node.node_queries import PATIENCE, RepeatedRequest
 
 
 class Service:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from ir_recorder.errors import RecorderError
-from ir_recorder.recording.topics import TopicSelection, checked_topics, single_type
+from ir_recorder.recording.cell_topics import TopicSelection, checked_topics, single_type
 
 
 def test_the_cells_topics_are_chosen_and_strangers_are_not() -> None:

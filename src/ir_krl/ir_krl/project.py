@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 
 from ir_krl.errors import KrlError, SourcePlace
 from ir_krl.language import Routine, SourceFile, SyntaxTree, parse
-from ir_krl.run.library import CONTROLLERS
+from ir_krl.run.built_in import CONTROLLERS
 from ir_krl.run.notes import Effect, Note
 from ir_values.files import ANYWHERE
 

@@ -32,7 +32,7 @@ from ir_krl.run.commands import (
 from ir_krl.run.notes import Effect, Note, worst_first
 from ir_krl.run.program import Followed
 from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES
-from ir_krl.write.names import INPUT, OUTPUT, Numbers, Wiring, check_name
+from ir_krl.write.identifiers import INPUT, OUTPUT, Numbers, Wiring, check_name
 from ir_krl.write.program_text import GRIP, Texts
 from ir_krl.write.statements import (
     Attached,

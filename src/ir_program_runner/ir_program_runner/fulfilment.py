@@ -12,7 +12,7 @@ from ir_msgs_py.modes import Mode, PowerMode
 from ir_msgs_py.names import TAKE_BACK
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.status import Status, StatusCode
-from ir_msgs_py.stops import same_driver, stop_count
+from ir_msgs_py.stop_numbers import same_driver, stop_count
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_program_runner import requests as ask
 from ir_program_runner.errors import CanceledError

@@ -13,7 +13,7 @@ import time
 from enum import Enum
 
 from ir_msgs_py.status import StatusCode
-from ir_msgs_py.stops import stop_count
+from ir_msgs_py.stop_numbers import stop_count
 from ir_sim_driver.errors import RequestRefusedError
 
 

@@ -23,7 +23,7 @@ from ir_krl.run.commands import (
     Target,
     TimeBlock,
 )
-from ir_krl.run.control import Clock, Control
+from ir_krl.run.control_flow import Clock, Control
 from ir_krl.run.expressions import Expressions
 from ir_krl.run.memory import (
     CYCLIC,

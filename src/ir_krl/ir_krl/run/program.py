@@ -8,10 +8,10 @@ from typing import Any
 
 from ir_krl.errors import KrlMotionError, KrlRunError, SourcePlace
 from ir_krl.language import Parameter, Routine, SourceFile, SyntaxTree, place_of
+from ir_krl.run.built_in import COMPUTED, CONTROLLERS, FILLING, STOPPING, Library
 from ir_krl.run.commands import Command
-from ir_krl.run.control import Endless, Jump, LoopExit, Returned
+from ir_krl.run.control_flow import Endless, Jump, LoopExit, Returned
 from ir_krl.run.expressions import Expressions
-from ir_krl.run.library import COMPUTED, CONTROLLERS, FILLING, STOPPING, Library
 from ir_krl.run.memory import Memory, SignalRange, Signals, module_of
 from ir_krl.run.motions import Motions, Moving
 from ir_krl.run.notes import Effect, Note, worst_first

@@ -1,6 +1,6 @@
 """Texts of a program: .src and .dat, and the PLC's part of its pauses."""
 
-from ir_krl.write.names import Numbers, check_name
+from ir_krl.write.identifiers import Numbers, check_name
 from ir_krl.write.numbering import (
     BASES_MAX,
     Chosen,
@@ -9,7 +9,7 @@ from ir_krl.write.numbering import (
     frame_numbers,
     tool_numbers,
 )
-from ir_krl.write.plc import PlcPause, plc_input, plc_table, read_plc_table, structured_text
+from ir_krl.write.plc_part import PlcPause, plc_input, plc_table, read_plc_table, structured_text
 from ir_krl.write.program_text import (
     GRIP,
     PLC_DONE,

@@ -13,7 +13,7 @@ from ir_krl.errors import KrlError
 from ir_krl.run.commands import Payload
 from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES
 from ir_krl.write.forms import Forms, decimal, frame_text
-from ir_krl.write.names import INPUT, OUTPUT, WIDTHS, Numbers, Wiring, check_name
+from ir_krl.write.identifiers import INPUT, OUTPUT, WIDTHS, Numbers, Wiring, check_name
 from ir_krl.write.numbering import BASES_MAX, TOOL_HIGHEST
 from ir_krl.write.statements import (
     Attached,

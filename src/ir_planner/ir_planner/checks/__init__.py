@@ -1,5 +1,14 @@
 """Checks of a configuration or a trajectory: free, limits, torque, clearance, energy, proof."""
 
+from ir_planner.checks.cell_shapes import (
+    CLOSEST,
+    PATH,
+    ZONES,
+    Colour,
+    Shape,
+    cell_shapes,
+    movement_shapes,
+)
 from ir_planner.checks.distances import nearest_pair, pair_value
 from ir_planner.checks.energy import (
     MovementEnergy,
@@ -31,15 +40,6 @@ from ir_planner.checks.intervals import (
     movement_spread,
     spread,
     standing_slope,
-)
-from ir_planner.checks.shapes import (
-    CLOSEST,
-    PATH,
-    ZONES,
-    Colour,
-    Shape,
-    cell_shapes,
-    movement_shapes,
 )
 from ir_planner.checks.tool_motion import ToolDerivatives, ToolUse, tool_derivatives
 from ir_planner.checks.verification import (

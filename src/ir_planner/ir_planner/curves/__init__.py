@@ -7,7 +7,7 @@ from ir_planner.curves.joint_spline import (
     virtual_knots,
 )
 from ir_planner.curves.polynomials import Extremes, extremes, motion_at
-from ir_planner.curves.rotations import (
+from ir_planner.curves.rotation_vectors import (
     RotationSpline,
     rotation_of,
     rotation_vector,

@@ -3,7 +3,7 @@
 from ir_planner.krl.execution import DrivenStep, Switched
 from ir_planner.krl.export import DEVIATION_MAX, KrlExport
 from ir_planner.krl.geometry import tool_in_flange
-from ir_planner.krl.requests import (
+from ir_planner.krl.krl_costs import (
     EvaluatedProgram,
     EvaluatedStep,
     evaluate_krl,

@@ -34,7 +34,7 @@ from ir_planner.program.steps import (
     placed_steps,
     with_doors,
 )
-from ir_planner.program.stops import StopNode, station_nodes
+from ir_planner.program.stop_nodes import StopNode, station_nodes
 from ir_planner.program.timeouts import Timeouts
 
 __all__ = [

@@ -8,7 +8,7 @@ import numpy as np
 from ir_kernels import portable
 from ir_planner.checks import FreeSpace
 from ir_planner.configurations import INTERACTION, InteractionSettings
-from ir_planner.program.bounds import MARGIN, CoarseCost, least_cost
+from ir_planner.program.cost_bounds import MARGIN, CoarseCost, least_cost
 from ir_planner.program.movements import Failure, Movements, cost_of, rates_of
 from ir_planner.program.request import Progress, StageError
 from ir_planner.program.station_graph import (
@@ -22,7 +22,7 @@ from ir_planner.program.station_graph import (
     StationGraph,
 )
 from ir_planner.program.steps import Route
-from ir_planner.program.stops import StopNode, path_nodes, posture_nodes, station_nodes
+from ir_planner.program.stop_nodes import StopNode, path_nodes, posture_nodes, station_nodes
 from ir_planner.request import Context
 from ir_planner.scene import STILL, movement_cost, path_cost
 from ir_planner.service import ExitSearch, ServiceLine

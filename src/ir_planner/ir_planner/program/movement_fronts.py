@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_kernels import portable
-from ir_planner.program.bounds import Rates
+from ir_planner.program.cost_bounds import Rates
 from ir_planner.program.movements import Failure, Movements, WarmStarts, cost_of, rates_of
 from ir_planner.program.request import StageError
 from ir_planner.program.station_graph import ACROSS, HopPart

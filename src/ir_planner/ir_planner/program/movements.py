@@ -13,10 +13,10 @@ from ir_msgs_py.status import Status, StatusCode
 from ir_planner import optimize
 from ir_planner.checks import Consumption, tilt_violation
 from ir_planner.errors import RequestError, TimingError
-from ir_planner.program.bounds import Rates
+from ir_planner.program.cost_bounds import Rates
 from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, HopPart
 from ir_planner.program.steps import Route
-from ir_planner.program.stops import StopNode
+from ir_planner.program.stop_nodes import StopNode
 from ir_planner.regional import Searches, search_regional
 from ir_planner.request import Context, Goal, Journal, Work, parse_goal
 from ir_planner.service import timed_service

@@ -34,7 +34,7 @@ from ir_planner.program.savings import held_against_common, named
 from ir_planner.program.spreads import Spreads
 from ir_planner.program.station_graph import HopPart, Settled, StationGraph
 from ir_planner.program.steps import Route, Scenes, doors_advice, doors_text, placed_steps, steps_of
-from ir_planner.program.stops import StopNode, leaves_zone
+from ir_planner.program.stop_nodes import StopNode, leaves_zone
 from ir_planner.request import Context, Journal, Work, noted
 from ir_planner.scene import PlanningScene, scene_with
 from ir_planner.service import ExitPath, exit_searches, lines_free, service_lines

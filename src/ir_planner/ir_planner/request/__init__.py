@@ -1,15 +1,5 @@
 """Requests and the record of their answers: bounds, goals, counted work, the journal."""
 
-from ir_planner.request.bounds import (
-    DURATION_MAX,
-    POSITION_MAX,
-    bounded,
-    checked_options,
-    chosen,
-    examinable,
-    leaning_freely_only,
-    safety_distance,
-)
 from ir_planner.request.context import (
     Clock,
     Context,
@@ -31,6 +21,16 @@ from ir_planner.request.goals import (
     one_goal,
     parse_goal,
     within_limits,
+)
+from ir_planner.request.request_bounds import (
+    DURATION_MAX,
+    POSITION_MAX,
+    bounded,
+    checked_options,
+    chosen,
+    examinable,
+    leaning_freely_only,
+    safety_distance,
 )
 
 __all__ = [

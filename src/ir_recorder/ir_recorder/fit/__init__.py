@@ -1,9 +1,8 @@
 """Power parameters fitted to a meter or to the motors, and what the data say of each."""
 
 from ir_recorder.fit.channels import open_prior
-from ir_recorder.fit.data import BY, DataSource, FitData, fit_data, source_cell
 from ir_recorder.fit.doubts import doubts, fit_sources, result
-from ir_recorder.fit.estimate import Estimate, Fit, FittedMovement, fit
+from ir_recorder.fit.fit_data import BY, DataSource, FitData, fit_data, source_cell
 from ir_recorder.fit.left_out import (
     LeftOut,
     left_out,
@@ -12,6 +11,7 @@ from ir_recorder.fit.left_out import (
     recommendation,
     shaft_work,
 )
+from ir_recorder.fit.power_estimate import Estimate, Fit, FittedMovement, fit
 from ir_recorder.fit.presentation import left_out_rows, parameter_rows, sentences, write_fit_picture
 
 __all__ = [

@@ -14,8 +14,8 @@ from ir_description import PowerParameters
 from ir_description.robot import AXIS_UNITS, CENTRES, parameter_unit
 from ir_recorder.errors import RecorderError
 from ir_recorder.fit.channels import MOVED, FittedRun, by_window
-from ir_recorder.fit.data import DataSource, FitData, fit_data
-from ir_recorder.fit.estimate import Estimate, Fit
+from ir_recorder.fit.fit_data import DataSource, FitData, fit_data
+from ir_recorder.fit.power_estimate import Estimate, Fit
 from ir_recorder.measure import Samples
 from ir_values.arrays import FloatArray, IntArray
 

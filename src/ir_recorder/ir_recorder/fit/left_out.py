@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_recorder.fit.channels import MOVED, WINDOW, FittedRun, Motors
-from ir_recorder.fit.estimate import Estimate
+from ir_recorder.fit.power_estimate import Estimate
 from ir_recorder.measure import movements
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 

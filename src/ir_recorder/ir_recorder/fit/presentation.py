@@ -12,8 +12,8 @@ import numpy as np
 from ir_description import PowerParameters
 from ir_description.robot import parameter_unit
 from ir_recorder.errors import RecorderError
-from ir_recorder.fit.estimate import Fit, FittedMovement
 from ir_recorder.fit.left_out import METHODS, LeftOut
+from ir_recorder.fit.power_estimate import Fit, FittedMovement
 from ir_recorder.report.files import write_output
 from ir_recorder.report.picture import PICTURE_START
 from ir_values.files import ANYWHERE

@@ -16,7 +16,6 @@ from rclpy.node import Node
 
 from ir_msgs.srv import StartRecording, StopRecording
 from ir_msgs_py import names
-from ir_msgs_py.checks import one_line
 from ir_msgs_py.ros.diagnostics import ERROR, OK, WARN, Condition, Diagnostics
 from ir_msgs_py.ros.node_process import own_words, run_node
 from ir_msgs_py.ros.parameters import Parameters
@@ -33,8 +32,9 @@ from ir_recorder.format import contents
 from ir_recorder.format.contents import Split
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.format.schemas import SchemaLibrary
-from ir_recorder.node.requests import CellRequest, ParameterRequests
+from ir_recorder.node.node_queries import CellRequest, ParameterRequests
 from ir_recorder.node.subscriptions import TopicListener, is_own
+from ir_recorder.recording.cell_topics import TopicSelection, checked_topics, single_type
 from ir_recorder.recording.session import (
     CellFiles,
     RecordingSession,
@@ -43,10 +43,9 @@ from ir_recorder.recording.session import (
     files_of_cell,
 )
 from ir_recorder.recording.settings import RecorderSettings
-from ir_recorder.recording.topics import TopicSelection, checked_topics, single_type
 from ir_recorder.recording.worker import Act, Message, RecordingWorker
 from ir_recorder.recording.writer import OpenWriter, RecordingSummary, RecordingWriter, open_writer
-from ir_values.errors import InvalidValueError, IrError
+from ir_values.errors import InvalidValueError, IrError, one_line
 from ir_values.files import FileRoots
 
 # Answers to ~/start and ~/stop: a refusal is a status, and no request ends the node.

@@ -11,7 +11,7 @@ import numpy as np
 
 from ir_recorder.errors import ReadError, SchemaError
 from ir_recorder.format.schemas import SchemaLibrary
-from ir_recorder.reading.limits import ChunkReader, ReadLimits, TooLargeError
+from ir_recorder.reading.chunk_limits import ChunkReader, ReadLimits, TooLargeError
 from ir_recorder.reading.mcap_file import RawChannel, RawRecording, in_order
 from ir_values.errors import FileRefusedError, one_line
 from ir_values.files import ANYWHERE, FileRoots

@@ -19,7 +19,7 @@ from ir_msgs_py import names
 from ir_recorder.errors import ReadError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import part_path, repeated_messages
-from ir_recorder.reading.limits import ChunkReader, ReadLimits, TooLargeError, most_of
+from ir_recorder.reading.chunk_limits import ChunkReader, ReadLimits, TooLargeError, most_of
 from ir_values.arrays import IntArray
 from ir_values.errors import FileRefusedError, one_line
 from ir_values.files import ANYWHERE, FileRoots

@@ -18,7 +18,7 @@ from ir_recorder.errors import ReadError
 from ir_recorder.format import contents
 from ir_recorder.reading.bag_file import read_bag_file
 from ir_recorder.reading.cdr import Columns, by_name, fitting, joint_groups, one_robot
-from ir_recorder.reading.limits import ReadLimits
+from ir_recorder.reading.chunk_limits import ReadLimits
 from ir_recorder.reading.mcap_file import RawChannel, RawRecording, chosen_namespace, read_raw
 from ir_recorder.reading.messages import contact_sentence, decoder_of, movement_from, savings_from
 from ir_recorder.reading.planner_answers import planned_program, with_plans

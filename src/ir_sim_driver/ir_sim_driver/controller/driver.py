@@ -280,7 +280,7 @@ class Driver:
 
     @property
     def stop_number(self) -> int:
-        """Number of the last stop (`ir_msgs_py.stops`)."""
+        """Number of the last stop (`ir_msgs_py.stop_numbers`)."""
         return self._simulation.stop_number
 
     @property

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
-from ir_msgs_py.stops import stop_count
+from ir_msgs_py.stop_numbers import stop_count
 from ir_sim_driver.controller.goal_checks import VettedGoal
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.errors import TrajectoryRefusedError

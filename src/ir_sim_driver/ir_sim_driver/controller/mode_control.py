@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from ir_msgs_py.modes import DRIVES_ON, OFF_THE_NETWORK, READY, RESTS, ROW, Mode, PowerMode
 from ir_msgs_py.plc import OperatingMode, PlcOutputs
 from ir_msgs_py.status import StatusCode
-from ir_msgs_py.stops import stop_count
+from ir_msgs_py.stop_numbers import stop_count
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.plc import OFF_BIT, Plc

@@ -67,7 +67,7 @@ class ControllerSettings:
 @dataclass(frozen=True)
 class SimulationSettings:
     """All stages of the simulation; dt [s]: step of plant and controller. before_first_stop: number
-    of stops before the first one (`ir_msgs_py.stops`).
+    of stops before the first one (`ir_msgs_py.stop_numbers`).
     """
 
     dt: float = DT

@@ -14,7 +14,7 @@ from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.modes import OFF_THE_NETWORK, READY, Mode
 from ir_msgs_py.plc import OperatingMode, PlcOutputs
 from ir_msgs_py.status import StatusCode
-from ir_msgs_py.stops import same_driver, stop_count
+from ir_msgs_py.stop_numbers import same_driver, stop_count
 from ir_sim_driver.controller.contacts import CellWatch
 from ir_sim_driver.controller.goal_checks import VettedGoal, vet
 from ir_sim_driver.controller.mains import Mains

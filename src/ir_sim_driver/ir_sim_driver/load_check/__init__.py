@@ -2,14 +2,14 @@
 squares.
 """
 
-from ir_sim_driver.load_check.checks import LoadChecks, LoadCheckSettings
-from ir_sim_driver.load_check.estimate import (
+from ir_sim_driver.load_check.mass_estimate import (
     Declared,
     LoadFinding,
     NotedMotion,
     Uncertainty,
     weighed,
 )
+from ir_sim_driver.load_check.torque_check import LoadChecks, LoadCheckSettings
 
 __all__ = [
     "Declared",

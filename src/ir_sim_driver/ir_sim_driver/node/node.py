@@ -29,7 +29,7 @@ from ir_msgs_py.ros.diagnostics import Diagnostics
 from ir_msgs_py.ros.node_process import run_node
 from ir_msgs_py.ros.serving import BoundedService
 from ir_msgs_py.ros.topics import ACTION_SERVICES
-from ir_msgs_py.stops import before_first_stop
+from ir_msgs_py.stop_numbers import before_first_stop
 from ir_sim_driver.controller import Driver, Joints, Simulation, ended_by_stop, make_simulation
 from ir_sim_driver.errors import DriverError, TrajectoryRefusedError
 from ir_sim_driver.node.announcements import DriverAnnouncements

@@ -4,7 +4,6 @@ meter.
 
 from ir_sim_driver.plant.backend import Backend, MotorWork
 from ir_sim_driver.plant.backends import BACKENDS, make_backend
-from ir_sim_driver.plant.control import ControlSettings
 from ir_sim_driver.plant.loads import CUSTOM, Carried, carried, custom_load
 from ir_sim_driver.plant.plant_parameters import NOMINAL, Plant, nominal_plant, standing_watts
 from ir_sim_driver.plant.plants import (
@@ -18,6 +17,7 @@ from ir_sim_driver.plant.plants import (
 )
 from ir_sim_driver.plant.power_meter import BasePower, PowerMeter
 from ir_sim_driver.plant.pybullet_backend import PyBulletBackend
+from ir_sim_driver.plant.servo_control import ControlSettings
 
 __all__ = [
     "BACKENDS",

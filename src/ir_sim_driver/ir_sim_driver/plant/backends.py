@@ -10,10 +10,10 @@ from typing import Any
 from ir_description import Cell
 from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.plant.backend import Backend
-from ir_sim_driver.plant.control import ControlSettings
 from ir_sim_driver.plant.ideal_backend import IdealBackend
 from ir_sim_driver.plant.plant_parameters import Plant, nominal_plant
 from ir_sim_driver.plant.pybullet_backend import PyBulletBackend
+from ir_sim_driver.plant.servo_control import ControlSettings
 from ir_values.errors import DescriptionError, InvalidValueError
 from ir_values.extensions import Registry
 

@@ -15,9 +15,9 @@ from scipy.linalg.lapack import dposv
 from ir_description import Load, RobotModel
 from ir_sim_driver.errors import BackendError
 from ir_sim_driver.plant.backend import STANDING, MotorWork
-from ir_sim_driver.plant.control import ControlSettings, ServoControl
 from ir_sim_driver.plant.drivetrain import Drivetrain, Gears
 from ir_sim_driver.plant.plant_parameters import Plant
+from ir_sim_driver.plant.servo_control import ControlSettings, ServoControl
 from ir_values.arrays import FloatArray
 
 # Bodies: one per link, in its principal axes, its loads merged.

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ir_studies.cells.cell_model import CellModel
 from ir_studies.cells.instance import Instance, InstanceRobot, Schedule
-from ir_studies.cells.model import CellModel
 from ir_values.arrays import FloatArray
 
 PROVED = 1e-6

@@ -10,7 +10,7 @@ import numpy as np
 from ir_description import Cell, Load, data_sheet_of
 from ir_description.library import load_power_parameters
 from ir_description.robot import DATA_SHEET
-from ir_sim_driver.load_check.estimate import (
+from ir_sim_driver.load_check.mass_estimate import (
     Declared,
     LoadFinding,
     NotedMotion,

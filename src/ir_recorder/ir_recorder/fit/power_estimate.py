@@ -24,7 +24,7 @@ from ir_recorder.fit.channels import (
     open_prior,
     runs_of,
 )
-from ir_recorder.fit.data import check_determined, check_explained
+from ir_recorder.fit.fit_data import check_determined, check_explained
 from ir_recorder.measure import PowerModel, Samples, movements
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
