@@ -21,7 +21,7 @@ from ir_description import (
     check_cell,
     load_cell,
 )
-from ir_description.cell import ProcessTimes
+from ir_description.cell import PartPlaces, ProcessTimes
 
 FLEXIBLE = load_cell("flexible")
 TEXT = cell_to_yaml(FLEXIBLE)
@@ -185,3 +185,58 @@ def test_parts_come_to_the_first_station_and_go_from_the_last_one() -> None:
         places = places.after(ProgramStep("STATION", there, detach="gear"))
         assert places.lying["gear.1"] == visits[0]
     assert places.lying["gear"] == ""
+
+
+ROOMY = TEXT.replace("process: {seconds: 95}", "process: {seconds: 95}\n    capacity: 2")
+
+
+def test_a_machine_for_several_parts_takes_them_in_and_gives_them_as_they_came() -> None:
+    cell = cell_from_yaml(ROOMY)
+    assert cell.machine("lathe").places == 2
+    copies = tuple(
+        replace(
+            cell.part("gear"),
+            load=replace(cell.part("gear").load, name=f"gear.{k}", capsules=()),
+            bodies=(),
+            station="",
+        )
+        for k in (1, 2, 3)
+    )
+    places = replace(cell, parts=(*cell.parts, *copies)).parts_at_start()
+
+    def moved(places: PartPlaces, part: str, start: str, end: str) -> PartPlaces:
+        taken = places.after(ProgramStep("STATION", start, attach=part))
+        return taken.after(ProgramStep("STATION", end, detach=part))
+
+    places = moved(places, "gear", "infeed_pick", "lathe_chuck")
+    places = moved(places, "gear.1", "infeed_pick", "lathe_chuck")
+    assert places.at("lathe_chuck") == ("gear", "gear.1")
+    assert "lathe_chuck" not in places.lying.values()  # inside: the station is clear
+    assert places.at("infeed_pick") == ("gear.2",)  # parts inside don't come to the infeed
+    with pytest.raises(InvalidValueError, match=r"gear and gear\.1 lie there"):
+        moved(places, "gear.2", "infeed_pick", "lathe_chuck")
+    with pytest.raises(InvalidValueError, match="gear came before it"):
+        places.after(ProgramStep("STATION", "lathe_chuck", attach="gear.1"))
+    places = moved(places, "gear", "lathe_chuck", "washer_basket")
+    assert places.at("lathe_chuck") == ("gear.1",)
+
+
+def test_as_many_parts_lie_at_a_station_as_its_machine_holds() -> None:
+    (line,) = [line for line in ROOMY.splitlines() if line.strip().startswith("- name: gear")][:1]
+    start = ROOMY.index(line)
+    end = ROOMY.index("equipment:")
+    part = ROOMY[start:end]
+    assert "station: infeed_pick" in part
+
+    def with_parts(count: int, text: str) -> str:
+        more = [
+            part.replace("gear", f"gear.{k}").replace("infeed_pick", "lathe_chuck")
+            for k in range(1, count + 1)
+        ]
+        return text.replace(part, "".join([part, *more]))
+
+    assert len(cell_from_yaml(with_parts(2, ROOMY)).parts) == 3
+    with pytest.raises(CellFileError, match=r"gear\.1 and gear\.2 are there"):
+        cell_from_yaml(with_parts(3, ROOMY))
+    with pytest.raises(CellFileError, match=r"gear\.2 can't be at .*, gear\.1 is there"):
+        cell_from_yaml(with_parts(2, TEXT))

@@ -18,6 +18,7 @@ from ir_description import (
     Cell,
     ProgramStep,
     cell_from_yaml,
+    cell_hash,
     cell_to_yaml,
     check_cell,
     load_cell,
@@ -59,17 +60,16 @@ def roomy_at(parts_per_hour: float) -> SteadyPlan:
         for machine in CELL.equipment
     )
     planner = Planner(replace(CELL, equipment=machines), clock=lambda: 0.0)
-    return planner.plan_steady_cycle(parts_per_hour=parts_per_hour)
+    return planner.plan_steady_cycle(parts_per_hour=parts_per_hour, saving=True, cycles=2)
 
 
 def test_a_lathe_for_two_parts_is_twice_as_soon_and_no_dearer() -> None:
     plan = roomy_at(45.0)
     assert plan.cycle is not None
-    assert plan.cycle.period <= 80.0 + ROUNDING < at_thirty().fastest
+    assert plan.cycle.seconds_per_part <= 80.0 + ROUNDING < at_thirty().fastest
     assert plan.joules < at_thirty().joules
     assert plan.gap < 1.0
-    assert plan.program is None
-    assert plan.several == "lathe holds 2 parts"
+    assert plan.cycle.most == (2, 1, 1)
 
 
 def test_bars_of_a_machine_are_its_work_and_no_more_parts_than_it_works_on() -> None:
@@ -78,7 +78,8 @@ def test_bars_of_a_machine_are_its_work_and_no_more_parts_than_it_works_on() -> 
     bars = machine_bars(plan)
     for name, capacity in (("lathe", 2), ("washer", 1), ("gauge", 1)):
         seconds = CELL.machine(name).process
-        assert sum(length for _, length in bars[name]) == pytest.approx(seconds)
+        worked = sum(length for _, length in bars[name])
+        assert worked == pytest.approx(plan.cycle.units * seconds)
         for moment in np.linspace(0.0, plan.cycle.period, 500):
             working = sum(begin < moment < begin + length for begin, length in bars[name])
             assert working <= capacity
@@ -111,14 +112,38 @@ def test_two_parts_a_cycle_are_searched_for_until_the_time_is_up(searching: Even
     assert plan.joules == pytest.approx(at_thirty().joules, rel=SETTLED)
 
 
-def test_a_schedule_alone_has_no_run() -> None:
+def test_a_lathe_for_two_parts_has_a_program_that_is_certified_and_read_back() -> None:
+    plan = roomy_at(45.0)
+    assert plan.cycle is not None
+    assert plan.program is not None
+    assert plan.cell is not None
+    assert plan.run_cell is not None
+    assert plan.run is not None
+    assert plan.saving is not None
+    steps = (*plan.program.movements, *plan.run.movements)
+    assert all(step.report.certified for step in steps if step.trajectory is not None)
+    assert plan.program.report.duration == pytest.approx(plan.cycle.period, abs=ROUNDING)
+    awaited = {name for step in plan.program.movements for name in step.wait_for}
+    assert awaited == {"lathe.1.done", "lathe.2.done", "washer.done", "gauge.done"}
+    assert plan.saving.common > plan.saving.joules
+    assert plan.saving.common_period >= plan.cycle.period - ROUNDING
+    for cell in (plan.cell, plan.run_cell):
+        again = cell_from_yaml(cell_to_yaml(cell))
+        assert again.program == cell.program
+        assert cell_hash(again) == cell_hash(cell)
+
+
+def test_a_program_in_which_slots_take_long_to_repeat_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(steady_plan, "_PARTS_MAX", 1)
     machines = tuple(
-        replace(machine, capacity=2) if machine.name == "lathe" else machine
+        replace(machine, buffer=1) if machine.name == "lathe" else machine
         for machine in CELL.equipment
     )
-    planner = Planner(replace(CELL, equipment=machines))
-    with pytest.raises(RequestError, match="lathe holds 2 parts"):
-        planner.plan_steady_cycle(parts_per_hour=45.0, cycles=2)
+    planner = Planner(replace(CELL, equipment=machines), clock=lambda: 0.0)
+    with pytest.raises(RequestError, match="2 parts until all have used their slots in turn"):
+        planner.plan_steady_cycle()
 
 
 def test_every_movement_is_certified_and_the_robot_is_back_where_it_began() -> None:

@@ -54,6 +54,30 @@ def test_without_surprises_the_schedule_is_the_plan() -> None:
         assert parts[-1].joules == pytest.approx(plan.joules, rel=ROUNDING)
 
 
+def test_without_surprises_parts_in_slots_are_in_the_plan_s_time() -> None:
+    """A washer for two parts: followed by the signals of its slots, nobody is late."""
+    cell = two_machines()
+    machines = tuple(
+        replace(machine, capacity=2) if machine.name == "washer" else machine
+        for machine in cell.equipment
+    )
+    planner = Planner(replace(cell, equipment=machines), clock=lambda: 0.0)
+    plan = planner.plan_steady_cycle(cycles=2)
+    assert plan.run is not None
+    assert plan.cycle is not None
+    assert plan.cycle.most == (2, 1)
+    replay = Replay(plan)
+    parts = replay.follow(replay.planned_times(), BY_ITSELF, LENGTHS)
+    assert sum(part.late for part in parts) <= ROUNDING
+    planned = sum(part.seconds for part in parts)
+    assert planned <= plan.run.report.duration + ROUNDING
+    half = replay.planned_times()
+    half["washer"] = [seconds + 30.0 for seconds in half["washer"]]
+    late = replay.follow(half, BY_ITSELF, LENGTHS)
+    each = 30.0 * len(parts) / 2.0  # two parts at once
+    assert sum(part.seconds for part in late) >= planned + each - 60.0
+
+
 @given(
     machine=st.sampled_from(("washer", "gauge")),
     seconds=st.floats(30.0, 3600.0),

@@ -82,6 +82,40 @@ def test_a_part_is_done_its_process_after_the_last_start_unless_it_was_taken(
         assert machines.holds([Signal("done", False)])
 
 
+@given(
+    waits=st.lists(st.floats(0.01, 20.0), min_size=1, max_size=12),
+    seconds=st.floats(0.5, 30.0),
+    capacity=st.integers(1, 3),
+)
+def test_a_machine_works_on_as_many_parts_as_it_can_and_others_wait_in_their_order(
+    waits: list[float], seconds: float, capacity: int
+) -> None:
+    """Each part in a slot of its own; part k begins when it is there and part k - capacity is
+    finished.
+    """
+    slots = [
+        described
+        for k in range(len(waits))
+        for described in (
+            Described(f"start{k}"),
+            Described(f"done{k}", follows=f"start{k}", process="lathe"),
+        )
+    ]
+    times = {"lathe": ProcessTimes(seconds, seconds)}
+    machines = Machines(slots, times, capacities={"lathe": capacity})
+    now = 0.0
+    ends: list[float] = []
+    for k, wait in enumerate(waits):
+        now += wait
+        for answer in machines.take_answers(now):
+            machines.hear(answer, now)
+        machines.set(Signal(f"start{k}", True), now)
+        free = ends[k - capacity] if k >= capacity else now
+        ends.append(max(now, free) + seconds)
+        for j, end in enumerate(ends):
+            assert machines.holds([Signal(f"done{j}", end <= now)])
+
+
 def test_times_that_vary_are_drawn_from_their_samples_and_again_with_their_seed() -> None:
     def times(seed: int) -> list[float]:
         machines = Machines(LATHE, {"lathe": ProcessTimes.of([3.0, 4.0, 9.0])}, seed)

@@ -67,6 +67,39 @@ def test_every_part_needs_what_was_planned() -> None:
     assert [span.seconds for span in gauge.working] == pytest.approx([12.0] * 3, abs=0.02)
 
 
+@pytest.mark.parametrize(
+    ("capacity", "buffer"), [pytest.param(1, 1, marks=pytest.mark.long), (2, 1)]
+)
+def test_parts_in_a_machine_for_several_need_what_was_planned(capacity: int, buffer: int) -> None:
+    cell = cell_of_one_machine()
+    machines = tuple(
+        replace(machine, process=40.0, capacity=capacity, buffer=buffer)
+        if machine.name == "gauge"
+        else machine
+        for machine in cell.equipment
+    )
+    planner = Planner(replace(cell, equipment=machines), clock=lambda: 0.0)
+    plan = planner.plan_steady_cycle(cycles=2)
+    assert plan.run is not None
+    assert plan.run_cell is not None
+    assert plan.cycle is not None
+    assert max(plan.cycle.most) > 1
+    run = driven_program(plan.run_cell, plan.run.movements)
+    run.close()
+    tending = tending_of(plan.run_cell, run.steps, run.signals)
+    assert tending is not None
+    assert len(tending.parts) >= 2 * plan.cycle.units
+    for part in tending.parts:
+        assert part.joules == pytest.approx(part.planned_joules, rel=SHARE, abs=JOULES)
+        assert not part.late
+    assert len(tending.machines) == plan.cycle.most[0]
+    worked = sorted((s for m in tending.machines for s in m.working), key=lambda span: span.begin)
+    for k, span in enumerate(worked):
+        at_once = [other for other in worked[:k] if other.end > span.begin + 0.01]
+        assert len(at_once) < capacity
+        assert span.seconds <= 40.0 + 0.02
+
+
 def test_a_late_machine_is_waited_for_and_named() -> None:
     tending = driven(LATE)
     (gauge,) = tending.machines

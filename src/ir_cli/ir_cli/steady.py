@@ -19,7 +19,6 @@ from ir_planner import Planner, ProgramPlan, SteadyPlan
 from ir_planner.flexible import (
     SHARES,
     counted_times,
-    cycle_steps,
     outage_replay,
     with_counted_times,
 )
@@ -130,9 +129,7 @@ def run_steady(arguments: argparse.Namespace, report: Report) -> int:
 def _write(
     plan: SteadyPlan, planner: Planner, arguments: argparse.Namespace, report: Report
 ) -> None:
-    """Write all outputs. Raises InputError for one that a schedule alone doesn't have."""
-    if plan.several and any(output.suffix != ".png" for output in arguments.output):
-        raise InputError(f"there is a schedule alone, to be written as .png: {plan.several}")
+    """Write all outputs."""
     for output in arguments.output:
         if output.suffix in PICTURES:
             sys.stderr.write(f"ir: {_written(plan, output, front=arguments.front)}\n")
@@ -182,20 +179,7 @@ def _written(plan: SteadyPlan, path: Path, *, front: bool) -> Path:
 
 def _rows(plan: SteadyPlan) -> list[Row]:
     """One row per step of the cycle, SI units."""
-    if plan.program is None:
-        return [
-            {
-                "begin": step.start,
-                "seconds": step.seconds,
-                "joules": np.nan,
-                "what": f"{step.kind} {step.from_station} {step.to_station}",
-                "mode": step.power_mode,
-                "wait_for": "",
-                "set_signals": "",
-                "load": "",
-            }
-            for step in cycle_steps(plan)
-        ]
+    assert plan.program is not None
     rows: list[Row] = []
     begin = 0.0
     for step in plan.program.movements:
@@ -219,20 +203,21 @@ def _rows(plan: SteadyPlan) -> list[Row]:
 def _totals(plan: SteadyPlan) -> Row:
     """Figures of the cycle."""
     assert plan.cycle is not None
-    report = None if plan.program is None else plan.program.report
+    assert plan.program is not None
+    report = plan.program.report
     units = plan.cycle.units
     return {
-        "program_id": "" if plan.program is None else plan.program.program_id,
+        "program_id": plan.program.program_id,
         "parts_per_hour": HOUR / plan.cycle.seconds_per_part,
         "period": plan.cycle.period,
         "units": plan.cycle.units,
         "fastest_period": plan.fastest,
         "order": [plan.machines[visit.activity] for visit in plan.cycle.visits],
         "joules": plan.joules,
-        "joules_low": None if report is None else report.energy_low / units,
-        "joules_high": None if report is None else report.energy_high / units,
+        "joules_low": report.energy_low / units,
+        "joules_high": report.energy_high / units,
         "gap": plan.gap,
-        "certified": report is not None and report.certified,
+        "certified": report.certified,
         "planning_seconds": plan.info.planning_time,
         "truncated": plan.info.truncated,
     }
@@ -243,8 +228,8 @@ def _sentences(plan: SteadyPlan) -> list[str]:
     totals = _totals(plan)
     lines = [
         f"order: a part from {', '.join(totals['order'])}, each to the next station of the route",
-        f"{totals['parts_per_hour']:.2f} parts an hour, a cycle of {totals['period']:.2f} s "
-        f"(the shortest: {totals['fastest_period']:.2f} s)",
+        f"{totals['parts_per_hour']:.2f} parts an hour, a cycle of {totals['period']:.2f} s for "
+        f"{_parts(totals['units'])} (the shortest: {totals['fastest_period']:.2f} s a part)",
         f"{totals['joules'] / 1e3:.2f} kJ a part from the mains, {_proved(plan, totals)}",
         f"at most {totals['gap']:.2f} % above the cheapest cycle of these configurations, without "
         "what the capacitor carries from one movement to the next",
@@ -262,13 +247,13 @@ def _sentences(plan: SteadyPlan) -> list[str]:
     return lines
 
 
+def _parts(count: int) -> str:
+    return "a part" if count == 1 else f"{count} parts"
+
+
 def _proved(plan: SteadyPlan, totals: Row) -> str:
     """How sure the joules are, and what is proved of the movements."""
-    if plan.program is None:
-        return (
-            "predicted; a schedule of movements that are proved among parts at all other places, "
-            f"no program: {plan.several}"
-        )
+    assert plan.program is not None
     report = replace(
         plan.program.report,
         energy=totals["joules"],

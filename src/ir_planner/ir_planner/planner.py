@@ -618,8 +618,8 @@ class Planner:
         """The cheapest cycle of the cell's route that makes at least so many parts an hour, 0: as
         many as possible. saving: hold it against the common cycle; front_points: so many cycles
         from the fastest to the cheapest; cycles: also the run that fills the line from empty and
-        makes so many; units: parts a cycle at most. Where a machine holds several parts at once
-        there is a schedule alone, without program.
+        makes so many; units: parts a cycle at most. Where a machine holds several parts, which
+        use its slots in turn, the program is as many cycles as it takes until all were used.
         """
         options, note = self._checked(options_with(options, changes))
         request, work = self._cycle_request(options, cancelled)

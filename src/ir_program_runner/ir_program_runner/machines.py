@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from ir_description import Cell
-from ir_description.cell import ProcessTimes
+from ir_description.cell import ProcessTimes, begin_of_work
 from ir_msgs_py.plc import Signal
 from ir_values.errors import InvalidValueError
 
@@ -71,7 +71,9 @@ class Machines:
     """Levels of all signals; one that was never set is 0.
 
     times: how long each machine with a process works on a part, by name; where that varies it is
-    drawn, for every machine in a row of its own that the seed decides.
+    drawn, for every machine in a row of its own that the seed decides. capacities: on how many
+    parts each of them works at once, 1 where none is given; more wait, first in, first out. Each
+    place of such a machine has signals of its own.
     """
 
     def __init__(
@@ -79,9 +81,11 @@ class Machines:
         signals: Iterable[MachineSignal] = (),
         times: Mapping[str, ProcessTimes] | None = None,
         seed: int = 0,
+        capacities: Mapping[str, int] | None = None,
     ) -> None:
         self._signals = tuple(signals)
         self._times = times or {}
+        self._capacities = capacities or {}
         self._draws = {name: np.random.default_rng([seed, *name.encode()]) for name in self._times}
         self._levels = {signal.name: signal.initial for signal in self._signals}
         self._due: list[tuple[float, Signal]] = []
@@ -94,7 +98,8 @@ class Machines:
             for machine in cell.equipment
             if machine.process > 0.0
         }
-        return Machines(cell.signals, times, seed)
+        capacities = {machine.name: machine.capacity for machine in cell.equipment}
+        return Machines(cell.signals, times, seed, capacities)
 
     def set(self, signal: Signal, now: float) -> None:
         """Take a level; machines that follow it will answer later. now: a steady clock [s]."""
@@ -111,8 +116,15 @@ class Machines:
                 self._levels[each.name] = False
                 self._due.append((now, Signal(each.name, False)))
             if signal.value:
+                capacity = self._capacities.get(each.process, 1)
+                begin = begin_of_work(now, self._ends(each.process), capacity)
                 seconds = self._times[each.process].drawn(self._draws[each.process])
-                self._due.append((now + seconds, Signal(each.name, True)))
+                self._due.append((begin + seconds, Signal(each.name, True)))
+
+    def _ends(self, machine: str) -> list[float]:
+        """When a machine will have finished the parts that it has."""
+        names = {each.name for each in self._signals if each.process == machine}
+        return [when for when, answer in self._due if answer.name in names and answer.value]
 
     def hear(self, signal: Signal, now: float) -> None:
         """Take a level from outside. Raises InvalidValueError for a new name when there are

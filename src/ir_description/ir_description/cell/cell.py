@@ -273,12 +273,30 @@ def check_program(cell: _Cell) -> None:
         state = check_step(step, state, stations, signals, paths)
 
 
-def check_single_places(parts: Iterable[Part]) -> None:
-    """Refuse two parts that lie at one station."""
-    register = NameRegister("a part at station")
-    for part in parts:
-        if part.station:
-            register.add(part.station)
+def places_before(
+    parts: Iterable[Part],
+    equipment: Iterable[Equipment],
+    stations: Iterable[Station],
+    route: PartRoute | None,
+) -> PartPlaces:
+    """Where the parts of a cell are before its program."""
+    machines = {machine.name: machine.places for machine in equipment if route is not None}
+    held = {station.name: machines.get(station.equipment, 1) for station in stations}
+    rooms = {name: places for name, places in held.items() if places > 1}
+    inside = {part.name: part.station for part in parts if part.station in rooms}
+    lying = {part.name: "" if part.name in inside else part.station for part in parts}
+    return PartPlaces("", lying, route=route, rooms=rooms, inside=inside)
+
+
+def check_part_place(part: Part, start: PartPlaces) -> None:
+    """Refuse a part at a station where as many as it holds are at the start."""
+    if part.station:
+        there = start.at(part.station)[: start.rooms.get(part.station, 1)]
+        if part.name not in there:
+            raise InvalidValueError(
+                f"{part.name} can't be at station {part.station}, {' and '.join(there)} "
+                f"{'is' if len(there) == 1 else 'are'} there"
+            )
 
 
 def _load_capsules(cell: _Cell) -> tuple[Capsule, ...]:
@@ -353,7 +371,9 @@ class Cell:
             )
             check_posture(self.robot, frozen(task.goal, (n,), "goal"), f"goal of task {task.name}")
         check_names(self)
-        check_single_places(self.parts)
+        start = self.parts_at_start()
+        for part in self.parts:
+            check_part_place(part, start)
         check_payload(self)
         check_contacts(self)
         check_program(self)
@@ -469,8 +489,8 @@ class Cell:
     def parts_at_start(self) -> PartPlaces:
         """Return where the parts are before the program's first step."""
         carrying = self.whole_loads[0].name if self.whole_loads else ""
-        lying = {part.name: part.station for part in self.parts}
-        return PartPlaces("", lying, carrying, self.route)
+        places = places_before(self.parts, self.equipment, self.stations, self.route)
+        return replace(places, carrying=carrying)
 
     def loads_at(self, places: PartPlaces) -> tuple[Load, ...]:
         """Return what is carried while the parts are at `places`."""

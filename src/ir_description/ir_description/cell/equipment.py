@@ -198,6 +198,11 @@ class Equipment:
             if end not in known:
                 raise UnknownNameError(f"state that the switch of {self.name} names", end, known)
 
+    @property
+    def places(self) -> int:
+        """How many parts it holds at most."""
+        return self.capacity + self.buffer
+
     def has_default_zone(self, stations: Iterable[Station]) -> bool:
         """Whether its zone is the one that a machine with these stations has where none is
         given.
@@ -237,6 +242,14 @@ class Equipment:
     def _world_bodies(self) -> tuple[Body, ...]:
         """Placed once: every scene of a program asks for them."""
         return tuple(body.placed(self.pose) for body in self.present_bodies())
+
+
+def begin_of_work(now: float, ends: Iterable[float], capacity: int) -> float:
+    """When a machine that works on so many parts at once begins with one that comes `now` [s]: at
+    once, or when it has finished one of those that came before, which it does at `ends`.
+    """
+    last = sorted(ends)[-capacity:]
+    return max(now, last[0]) if len(last) == capacity else now
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
 from ir_description.cell.equipment import ToolTilt
@@ -146,13 +146,22 @@ class PartPlaces:
     none. carrying: the one of the cell's whole loads that stands for tool and part, "" for none.
     route: of the parts that come and go by themselves, None for none: what is put down at its last
     station is taken away; when a part is put down elsewhere, the next one comes to its first
-    station, the first by name order of the file that isn't there.
+    station, the first by name order of the file that isn't there. rooms: by station, how many parts
+    its machine holds, where those are several: what is put down there is `inside` the machine until
+    it is taken, in the order in which it came.
     """
 
     held: str
     lying: Mapping[str, str]
     carrying: str = ""
     route: PartRoute | None = None
+    rooms: Mapping[str, int] = field(default_factory=dict)
+    inside: Mapping[str, str] = field(default_factory=dict)
+
+    def at(self, station: str) -> tuple[str, ...]:
+        """The parts that lie at a station or are in its machine, who came first before others."""
+        waiting = tuple(part for part, where in self.inside.items() if where == station)
+        return waiting or tuple(part for part, where in self.lying.items() if where == station)
 
     def after(self, step: ProgramStep) -> PartPlaces:
         """Return where they are after a step; a step that can't be done is refused."""
@@ -162,6 +171,7 @@ class PartPlaces:
     def _handled(self, step: ProgramStep) -> PartPlaces:
         if step.attach:
             where = self._station_of(step.attach)
+            first = self.at(where)[:1]
             if self.held:
                 raise InvalidValueError(f"{step.attach} can't be attached, {self.held} is held")
             if where != step.target:
@@ -169,30 +179,49 @@ class PartPlaces:
                     f"{step.attach} can't be attached at {step.target}, it lies at "
                     f"{where or 'no station'}"
                 )
-            return replace(self, held=step.attach, lying={**self.lying, step.attach: ""})
+            if where and first != (step.attach,):
+                raise InvalidValueError(
+                    f"{step.attach} can't be attached at {where}: {first[0]} came before it"
+                )
+            return self.taken(step.attach)
         if step.detach:
             self._station_of(step.detach)
             if self.held != step.detach:
                 raise InvalidValueError(
                     f"{step.detach} can't be detached, {self.held or 'no part'} is held"
                 )
-            for part, station in self.lying.items():
-                if station == step.target:
-                    raise InvalidValueError(
-                        f"{step.detach} can't be detached at {station}, {part} lies there"
-                    )
-            lying = {**self.lying, step.detach: step.target}
-            return replace(self, held="", lying=self.supplied(lying))
+            there = self.at(step.target)
+            if len(there) >= self.rooms.get(step.target, 1):
+                names = " and ".join(there)
+                raise InvalidValueError(
+                    f"{step.detach} can't be detached at {step.target}, {names} "
+                    f"{'lies' if len(there) == 1 else 'lie'} there"
+                )
+            return self.put(step.detach, step.target)
         return self
 
-    def supplied(self, lying: dict[str, str]) -> dict[str, str]:
-        """Where parts lie once the route has taken away and brought what it does."""
+    def taken(self, part: str) -> PartPlaces:
+        """Where they are with this part in the gripper."""
+        inside = {name: station for name, station in self.inside.items() if name != part}
+        return replace(self, held=part, lying={**self.lying, part: ""}, inside=inside)
+
+    def put(self, part: str, station: str) -> PartPlaces:
+        """Where they are when the held part was put down at a station ("": nowhere) and the route
+        has taken away and brought what it does.
+        """
+        roomy = station in self.rooms
+        inside = {**self.inside, part: station} if roomy else self.inside
+        lying = {**self.lying, part: "" if roomy else station}
+        return replace(self, held="", lying=self._supplied(lying, inside), inside=inside)
+
+    def _supplied(self, lying: dict[str, str], inside: Mapping[str, str]) -> dict[str, str]:
         route = self.route
         if route is None:
             return lying
         last = route.visits[-1]
         lying = {part: "" if station == last else station for part, station in lying.items()}
-        following = route.following(part for part, station in lying.items() if not station)
+        absent = (part for part, station in lying.items() if not station and part not in inside)
+        following = route.following(absent)
         if following and route.visits[0] not in lying.values():
             lying[following] = route.visits[0]
         return lying
@@ -200,7 +229,7 @@ class PartPlaces:
     def _station_of(self, part: str) -> str:
         if part not in self.lying:
             raise UnknownNameError("part", part, self.lying)
-        return self.lying[part]
+        return self.inside.get(part, self.lying[part])
 
 
 @dataclass(frozen=True)

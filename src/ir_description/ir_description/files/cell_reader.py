@@ -31,12 +31,14 @@ from ir_description.cell import (
     check_follows,
     check_numbers,
     check_part_mass,
+    check_part_place,
     check_path,
     check_posture,
     check_processes,
     check_route,
     check_step,
     check_switch,
+    places_before,
     shape_register,
 )
 from ir_description.files.equipment_reader import (
@@ -216,6 +218,10 @@ class _CellReader:
             with self._table["signals"].blamed():
                 check_processes(signals, equipment)
         route = self._route(parts, equipment, stations)
+        places = places_before(parts, equipment, stations, route)
+        for item, part in zip(self._list("parts", 1000), parts, strict=True):
+            with item.blamed():
+                check_part_place(part, places)
         home = self._posture("home", robot.machine_home)
         with self._root.blamed():
             return Cell(
@@ -231,7 +237,7 @@ class _CellReader:
                 signals=signals,
                 park=self._posture("park", home),
                 machine_home=home,
-                program=self._program(stations, paths, parts, signals, route),
+                program=self._program(stations, paths, signals, places),
                 tasks=read_tasks(self._list("tasks", 10_000), self._robot),
                 paths=paths,
                 floor=table["floor"].boolean() if "floor" in table else True,
@@ -313,13 +319,10 @@ class _CellReader:
 
     def _check_part_stations(self, parts: tuple[Part, ...], stations: tuple[Station, ...]) -> None:
         known = dict.fromkeys(station.name for station in stations)
-        taken = NameRegister("a part at station")
         for item, part in zip(self._list("parts", 1000), parts, strict=True):
-            if part.station:
-                with item.blamed():
-                    if part.station not in known:
-                        raise UnknownNameError("station", part.station, known)
-                    taken.add(part.station)
+            with item.blamed():
+                if part.station and part.station not in known:
+                    raise UnknownNameError("station", part.station, known)
 
     def _check_contacts(
         self,
@@ -412,12 +415,10 @@ class _CellReader:
         self,
         stations: tuple[Station, ...],
         paths: tuple[CellPath, ...],
-        parts: tuple[Part, ...],
         signals: tuple[CellSignal, ...],
-        route: PartRoute | None,
+        places: PartPlaces,
     ) -> tuple[ProgramStep, ...]:
         named = [dict.fromkeys(each.name for each in kind) for kind in (stations, signals, paths)]
-        places = PartPlaces("", {part.name: part.station for part in parts}, route=route)
         steps = []
         for item in self._list("program", 10_000):
             with item.blamed():

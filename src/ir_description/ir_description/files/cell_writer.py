@@ -339,9 +339,11 @@ def cell_hash(cell: Cell) -> str:
     has the same hash.
     """
     machines = tuple(_unswitched(machine) for machine in cell.equipment)
+    lying = cell.parts_at_start().lying
     place = replace(
         cell,
         description="",
+        parts=tuple(replace(part, station=lying[part.name]) for part in cell.parts),
         equipment=machines,
         stations=tuple(replace(each, takes=(), gives="") for each in cell.stations),
         program=(),

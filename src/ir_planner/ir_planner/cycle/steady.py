@@ -19,9 +19,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise, permutations, product
+from math import gcd, lcm
 
 import numpy as np
 
+from ir_description.cell import begin_of_work
 from ir_planner.cycle.linear import LinearProgram
 from ir_values.arrays import FloatArray
 
@@ -34,6 +36,7 @@ Arc = tuple[Node, Node]
 
 _EXACT = 1e-6  # relative, of the cost
 _SAME = 1e-9  # s
+_ROUNDS = 20  # cycles after which a machine's queue is what it always is
 
 
 @dataclass(frozen=True)
@@ -234,16 +237,56 @@ class SteadyCycle:
         """The activities in order."""
         return tuple((visit.activity, visit.unit) for visit in self.visits)
 
-    def repeated(self, units: int) -> SteadyCycle:
-        """The cycle of one unit, made so many times."""
+    @property
+    def turns(self) -> int:
+        """Cycles after which every place of a machine has a part of the same number again, where
+        parts take the places in turn.
+        """
+        return lcm(*(most // gcd(most, self.units) for most in self.most))
+
+    def number(self, visit: Visit) -> int:
+        """Which part a visit brings, those from 0 on come to the line in this cycle."""
+        return visit.unit - sum(self.full[: visit.activity])
+
+    def stay(self, visit: Visit) -> tuple[int, float]:
+        """Of the part that a visit takes from a machine: the unit that brought it there, and how
+        long it has been there then [s].
+        """
+        unit = visit.unit - self.full[visit.activity - 1]
+        load = self._load(visit.activity - 1, unit % self.units)
+        periods = -(unit // self.units)
+        return load.unit, visit.start + periods * self.period - load.start - load.seconds
+
+    def queued(self, machine: int, process: float, capacity: int) -> tuple[float, ...]:
+        """How long the part of each unit lies in a machine before it begins with it [s], since it
+        works on as many others as it can.
+        """
+        loads = [self._load(machine, unit) for unit in range(self.units)]
+        waits: list[float] = []
+        ends: list[float] = []
+        for round_ in range(_ROUNDS):
+            for load in loads:
+                here = round_ * self.period + load.start + load.seconds
+                begin = begin_of_work(here, ends[-capacity:], capacity)
+                waits.append(begin - here)
+                ends.append(begin + process)
+        return tuple(waits[-self.units :])
+
+    def _load(self, machine: int, unit: int) -> Visit:
+        """The visit that brings the part of a unit to a machine."""
+        return next(v for v in self.visits if (v.activity, v.unit) == (machine, unit))
+
+    def repeated(self, times: int) -> SteadyCycle:
+        """The cycle made so many times, as one."""
         visits = tuple(
-            replace(visit, unit=unit, start=visit.start + unit * self.period)
-            for unit in range(units)
+            replace(visit, unit=k * self.units + visit.unit, start=visit.start + k * self.period)
+            for k in range(times)
             for visit in self.visits
         )
         return SteadyCycle(
-            visits, units * self.period, units, units * self.joules, units * self.bound, self.full
-        )
+            visits, times * self.period, times * self.units, times * self.joules,
+            times * self.bound, self.full,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from ir_description import Cell, ProgramStep
-from ir_description.cell import PartRoute
+from ir_description.cell import PartRoute, begin_of_work
 from ir_planner.cycle import ModeWait, SteadyCycle, Visit
 from ir_planner.flexible.tending_cell import (
     front_name,
     machines_of,
     pause_steps,
     route_of,
+    slot_name,
     start_of,
     transport,
 )
@@ -33,60 +34,92 @@ Where = tuple[str, int, int]
 
 @dataclass(frozen=True)
 class Due:
-    """A wait ends so many seconds after the machine at a place of the route was started."""
+    """A wait ends so many seconds after the machine was started with the part in a slot."""
 
-    place: int
+    slot: str
     seconds: float
 
 
-def occupied(cycle: SteadyCycle) -> tuple[int, ...]:
-    """Places at whose machine a part lies when the cycle begins: it is taken before one is
-    brought.
+class MachineSlots:
+    """The slots of the machines along a route of a cell, of which parts take one after the other as
+    they come. cycle: what says how many parts each machine holds at most.
     """
-    first: dict[int, bool] = {}
-    for visit in cycle.visits:
-        first.setdefault(visit.activity, True)
-        first.setdefault(visit.activity + 1, False)
-    return tuple(sorted(place for place, taken in first.items() if taken and place > 0))
 
+    def __init__(self, cell: Cell, cycle: SteadyCycle) -> None:
+        names = machines_of(cell)[1:-1]
+        self.cycle = cycle
+        self._machines = [cell.machine(name) for name in names]
 
-def waits_for(cycle: SteadyCycle, process: Sequence[float]) -> dict[Where, Due]:
-    """What each wait of the cycle is for: the next machine whose part is taken as soon as it is
-    finished. A wait that is for none only fills the cycle.
-    """
-    visits = cycle.visits
-    found: dict[Where, Due] = {}
-    for k, visit in enumerate(visits):
-        end_of_hop = visit.start + visit.seconds + _length(visit.after)
-        for where, waits, end, first in (
-            (AFTER, visit.after, end_of_hop, k + 1),
-            (BEFORE, visit.before, visit.start, k),
-        ):
-            if not waits:
+    def of(self, place: int, number: int) -> str:
+        """The slot of a part of that number at a place of the route; "" where no machine works."""
+        if not 0 < place <= len(self._machines):
+            return ""
+        machine = self._machines[place - 1]
+        most = self.cycle.most[place - 1]
+        return slot_name(machine.name, number, most) if machine.process > 0.0 else ""
+
+    def finished(self, *, empty: bool) -> dict[str, dict[str, bool]]:
+        """By machine that works its slots, and whether each has a part when the cycle begins;
+        empty: none has.
+        """
+        slots: dict[str, dict[str, bool]] = {}
+        full = self.cycle.full
+        for place, machine in enumerate(self._machines, 1):
+            if machine.process > 0.0:
+                brought = -sum(full[: place - 1])
+                inside = {self.of(place, brought - 1 - k) for k in range(full[place - 1])}
+                own = [self.of(place, k) for k in range(self.cycle.most[place - 1])]
+                slots[machine.name] = {slot: slot in inside and not empty for slot in own}
+        return slots
+
+    def ready(self, place: int, now: float, ends: Sequence[float]) -> float:
+        """When the work on a part ends that comes to a place now. ends: of those before it, in
+        their order.
+        """
+        machine = self._machines[place - 1]
+        return begin_of_work(now, ends, machine.capacity) + machine.process
+
+    def waits_for(self) -> dict[Where, Due]:
+        """What each wait of the cycle is for: the next machine whose part is taken as soon as it is
+        finished. A wait that is for none only fills the cycle.
+        """
+        visits = self.cycle.visits
+        work = [
+            [wait + machine.process for wait in self._queued(k)]
+            for k, machine in enumerate(self._machines)
+        ]
+        found: dict[Where, Due] = {}
+        for k, visit in enumerate(visits):
+            end_of_hop = visit.start + visit.seconds + _length(visit.after)
+            for where, waits, end, first in (
+                (AFTER, visit.after, end_of_hop, k + 1),
+                (BEFORE, visit.before, visit.start, k),
+            ):
+                if not waits:
+                    continue
+                following = [visits[(first + i) % len(visits)] for i in range(len(visits))]
+                due = self._due(work, following, end)
+                if due is not None:
+                    found[where, visit.activity, visit.unit] = due
+        return found
+
+    def _queued(self, k: int) -> tuple[float, ...]:
+        machine = self._machines[k]
+        return self.cycle.queued(k, machine.process, machine.capacity)
+
+    def _due(
+        self, work: Sequence[Sequence[float]], following: Sequence[Visit], end: float
+    ) -> Due | None:
+        """work: from when it comes to a machine until it is finished, of the part of each unit."""
+        for visit in following:
+            slot = self.of(visit.activity, self.cycle.number(visit))
+            if not slot:
                 continue
-            following = [visits[(first + i) % len(visits)] for i in range(len(visits))]
-            due = _due(cycle, process, following, end)
-            if due is not None:
-                found[where, visit.activity, visit.unit] = due
-    return found
-
-
-def _due(
-    cycle: SteadyCycle, process: Sequence[float], following: Sequence[Visit], end: float
-) -> Due | None:
-    period = cycle.period
-    for visit in following:
-        if visit.activity == 0:
-            continue
-        seconds = process[visit.activity - 1]
-        if seconds == 0.0:
-            continue
-        loads = [each for each in cycle.visits if each.activity == visit.activity - 1]
-        since = min((visit.start - each.start - each.seconds) % period for each in loads)
-        lead = (visit.start - end) % period
-        if abs(since - seconds) < _SAME and lead <= seconds:
-            return Due(visit.activity, seconds - lead)
-    return None
+            unit, stay = self.cycle.stay(visit)
+            lead = (visit.start - end) % self.cycle.period
+            if abs(stay - work[visit.activity - 1][unit]) < _SAME and lead <= stay:
+                return Due(slot, stay - lead)
+        return None
 
 
 def _length(waits: Sequence[ModeWait]) -> float:
@@ -98,29 +131,26 @@ def cycle_program(cell: Cell, cycle: SteadyCycle) -> tuple[ProgramStep, ...]:
     again. It waits in front of stations, starts every machine when it has left it, and waits for
     the machine before it takes a part. cell: with the parts that lie there when the cycle begins.
     """
-    line = _Line(cell)
-    dues = waits_for(cycle, line.process)
+    line = _Line(cell, cycle)
+    dues = line.slots.waits_for()
     following = (*cycle.visits[1:], cycle.visits[0])
     for visit, after in zip(cycle.visits, following, strict=True):
         place = visit.activity
-        line.bring(place)
-        line.stand(_since(visit.after, dues.get((AFTER, place, visit.unit)), line.names))
+        line.bring(place, cycle.number(visit))
+        line.stand(_since(visit.after, dues.get((AFTER, place, visit.unit))))
         line.go(place, after.activity)
-        due = dues.get((BEFORE, after.activity, after.unit))
-        line.stand(_since(after.before, due, line.names))
+        line.stand(_since(after.before, dues.get((BEFORE, after.activity, after.unit))))
     return tuple(line.steps)
 
 
-def _since(
-    waits: Sequence[ModeWait], due: Due | None, names: Sequence[str]
-) -> list[tuple[float, str]]:
-    return [(wait.seconds, start_of(names[due.place]) if due else "") for wait in waits]
+def _since(waits: Sequence[ModeWait], due: Due | None) -> list[tuple[float, str]]:
+    return [(wait.seconds, start_of(due.slot) if due else "") for wait in waits]
 
 
 # The run: the line is filled from empty, then cycle follows cycle.
 #
-# A transport is left out where no part lies. What the robot does is the same otherwise, so the
-# line fills by itself, and in as many cycles as a part needs.
+# A transport is left out where its part hasn't come yet. What the robot does is the same otherwise,
+# so the line fills by itself, and in as many cycles as a part needs.
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,34 +170,41 @@ class CycleLengths:
 
 
 class _Line:
-    """The steps of a program as they are written; where the parts are, and when each machine was
-    started [s], after them.
+    """The steps of a program as they are written; where the parts are, and when the work in each
+    slot was started and ends [s], after them.
     """
 
-    def __init__(self, cell: Cell) -> None:
+    def __init__(self, cell: Cell, cycle: SteadyCycle) -> None:
         self.route: PartRoute = route_of(cell)
-        self.names = machines_of(cell)
-        self.process = [cell.machine(name).process for name in self.names[1:-1]]
+        self.slots = MachineSlots(cell, cycle)
         self.steps: list[ProgramStep] = []
-        self.started: dict[int, float] = {}
+        self.started: dict[str, float] = {}
+        self.ready: dict[str, float] = {}
         self.now = 0.0
+        self._ends: dict[int, list[float]] = {}
         self._cell = cell
         self._places = cell.parts_at_start()
 
-    def bring(self, place: int) -> None:
-        """The part at a place of the route to the next one."""
-        station = self.route.visits[place]
-        part = next(name for name, where in self._places.lying.items() if where == station)
-        finished = self._works(place)
-        start = self._works(place + 1)
-        for step in transport(self._cell, place, part, finished=finished, start=start):
+    def bring(self, place: int, number: int) -> None:
+        """The part of that number at a place of the route to the next one."""
+        part = self._places.at(self.route.visits[place])[0]
+        taken_from = self.slots.of(place, number)
+        brought_to = self.slots.of(place + 1, number)
+        for step in transport(
+            self._cell, place, part, taken_from=taken_from, brought_to=brought_to
+        ):
             self._places = self._places.after(step)
             self.steps.append(step)
-        self.started.pop(place, None)
+        self.started.pop(taken_from, None)
 
-    def _works(self, place: int) -> bool:
-        """Whether a machine works on the part at a place; at a buffer it only lies."""
-        return 0 < place <= len(self.process) and self.process[place - 1] > 0.0
+    def begin(self, place: int, number: int) -> None:
+        """The machine at a place is started now with the part of that number."""
+        slot = self.slots.of(place, number)
+        if slot:
+            ends = self._ends.setdefault(place, [])
+            ends.append(self.slots.ready(place, self.now, ends))
+            self.started[slot] = self.now
+            self.ready[slot] = ends[-1]
 
     def go(self, activity: int, following: int) -> None:
         """The empty hop from the end of an activity to the begin of another."""
@@ -180,6 +217,23 @@ class _Line:
         self.steps += pause_steps(waits)
         self.now += sum(seconds for seconds, _ in waits)
 
+    def wait(self, waits: Sequence[ModeWait], due: Due | None, *, full: bool) -> None:
+        """A wait of the cycle as long as it is now; one that only fills the cycle has its length in
+        whole cycles.
+        """
+        if due is None:
+            self.stand([(_length(waits) if full else 0.0, "")])
+            return
+        since = self.started.get(due.slot)
+        seconds = 0.0 if since is None else max(since + due.seconds - self.now, 0.0)
+        self.stand([(seconds, start_of(due.slot))])
+
+    def wait_for(self, slot: str) -> None:
+        """What is left until the part in a slot is finished, which is next."""
+        left = self.ready.get(slot, self.now) - self.now
+        if left > _SAME:
+            self.stand([(left, start_of(slot))])
+
 
 def run_program(
     cell: Cell, cycle: SteadyCycle, lengths: CycleLengths, cycles: int
@@ -189,56 +243,33 @@ def run_program(
     the first station again. cell: with all parts that can be in flight, of which one lies at the
     first station.
     """
-    line = _Line(cell)
-    dues = waits_for(cycle, line.process)
-    visits = list(_performed(cycle, len(line.route.visits) - 1, cycles))
-    for (visit, full), (after, _) in zip(visits, [*visits[1:], visits[0]], strict=True):
+    line = _Line(cell, cycle)
+    dues = line.slots.waits_for()
+    visits = list(_performed(cycle, cycles))
+    following = [*visits[1:], visits[0]]
+    for (visit, number, full), (after, next_number, _) in zip(visits, following, strict=True):
         place = visit.activity
-        line.bring(place)
+        line.bring(place, number)
         line.now += lengths.activities[place, visit.unit]
-        line.started[place + 1] = line.now
-        _wait(line, visit.after, dues.get((AFTER, place, visit.unit)), full=full)
+        line.begin(place + 1, number)
+        line.wait(visit.after, dues.get((AFTER, place, visit.unit)), full=full)
         line.go(place, after.activity)
         line.now += lengths.hop(visit, after.activity)
-        due = dues.get((BEFORE, after.activity, after.unit))
-        _wait(line, after.before, due, full=full)
-        _wait_for(line, after.activity)
-    return tuple(line.steps), tuple(visit.unit for visit, _ in visits)
+        line.wait(after.before, dues.get((BEFORE, after.activity, after.unit)), full=full)
+        line.wait_for(line.slots.of(after.activity, next_number))
+    return tuple(line.steps), tuple(visit.unit for visit, _, _ in visits)
 
 
-def _performed(cycle: SteadyCycle, last: int, cycles: int) -> Iterator[tuple[Visit, bool]]:
-    """The transports that find a part, cycle by cycle, and whether the cycle is whole."""
-    lying = set[int]()
+def _performed(cycle: SteadyCycle, cycles: int) -> Iterator[tuple[Visit, int, bool]]:
+    """The transports that find a part, cycle by cycle, with its number, and whether the cycle is
+    whole.
+    """
+    made = 0
     whole = 0
     while whole < cycles:
-        done = []
-        for visit in cycle.visits:
-            if visit.activity == 0 or visit.activity in lying:
-                lying.discard(visit.activity)
-                lying.add(visit.activity + 1)
-                lying.discard(last)
-                done.append(visit)
-        full = len(done) == len(cycle.visits)
+        numbered = [(visit, made + cycle.number(visit)) for visit in cycle.visits]
+        done = [(visit, number) for visit, number in numbered if number >= 0]
+        full = len(done) == len(numbered)
         whole += full
-        yield from ((visit, full) for visit in done)
-
-
-def _wait(line: _Line, waits: Sequence[ModeWait], due: Due | None, *, full: bool) -> None:
-    """A wait of the cycle as long as it is now; one that only fills the cycle has its length in
-    whole cycles.
-    """
-    if due is None:
-        line.stand([(_length(waits) if full else 0.0, "")])
-        return
-    since = line.started.get(due.place)
-    seconds = 0.0 if since is None else max(since + due.seconds - line.now, 0.0)
-    line.stand([(seconds, start_of(line.names[due.place]))])
-
-
-def _wait_for(line: _Line, place: int) -> None:
-    """What is left until the machine is ready whose part is next."""
-    if place not in line.started:
-        return
-    left = line.started[place] + line.process[place - 1] - line.now
-    if left > _SAME:
-        line.stand([(left, start_of(line.names[place]))])
+        made += cycle.units
+        yield from ((visit, number, full) for visit, number in done)

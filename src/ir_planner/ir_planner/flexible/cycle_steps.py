@@ -7,13 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_description import Cell, ProgramStep
+from ir_description import Cell, Equipment, ProgramStep
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
-from ir_planner.cycle import ModeWait, SteadyCycle, Visit
+from ir_planner.cycle import LinearProgram, ModeWait, SteadyCycle, Visit
 from ir_planner.flexible.columns import TendedRoute, UnitKey, activity_keys, exact
-from ir_planner.flexible.cycle_program import CycleLengths, cycle_program, occupied, run_program
+from ir_planner.flexible.cycle_program import (
+    CycleLengths,
+    MachineSlots,
+    cycle_program,
+    run_program,
+)
 from ir_planner.flexible.tending_cell import (
     front_name,
     machines_of,
@@ -43,6 +48,8 @@ from ir_planner.program import (
 from ir_planner.request import Context
 from ir_planner.service import ServiceLine
 from ir_planner.timing import Movement
+
+_NO_WAIT = 1e-9  # s
 
 
 @dataclass(frozen=True)
@@ -95,14 +102,16 @@ def _in_time_of(own: Sequence[PlannedMovement], parts: ProgramSavings) -> Progra
 
 class RouteSteps:
     """Programs among the configurations of a route, with certified movements, each proved in the
-    scene in which it is driven. finished: places where a part lies at the begin.
+    scene in which it is driven. empty: no part is in a machine at the begin, else those of the
+    cycle are, finished.
     """
 
     def __init__(
-        self, request: ProgramRequest, tending: TendedRoute, first: int, finished: Sequence[int]
+        self, request: ProgramRequest, tending: TendedRoute, cycle: SteadyCycle, *, empty: bool
     ) -> None:
         self.tending = tending
-        self.cell = _cell_of(request.cell, tending, finished)
+        self.cell = _cell_of(request.cell, tending, cycle, empty=empty)
+        first = cycle.visits[0].activity
         start = tending.nodes[tending.route.visits[first]].departure
         self.request = replace(request, cell=self.cell, start=start, stations=(), cycle_time=0.0)
         self._scenes = Scenes(self.cell, request.power, request.settings.drives(self.cell.robot))
@@ -180,20 +189,24 @@ class RouteSteps:
         return self._names.get(name, name)
 
 
-def _cell_of(cell: Cell, tending: TendedRoute, finished: Sequence[int]) -> Cell:
-    """With as many parts as can be in flight, one more than machines and one for the gripper; those
-    at the machines before which one lies finished, the others aren't there yet.
+def _cell_of(cell: Cell, tending: TendedRoute, cycle: SteadyCycle, *, empty: bool) -> Cell:
+    """With as many parts as can be in flight: those that machines hold at most, and one for the
+    gripper. Those that are in machines when the cycle begins are there, the others aren't yet.
     """
     route = tending.route
     scene = tending.empty
-    stations = {
-        number: route.visits[number] if number in finished else ""
-        for number in range(1, len(route.visits))
-    }
+    held = zip(route.visits[1:-1], cycle.full, cycle.most, strict=True)
+    places = [
+        station if number < full and not empty else ""
+        for station, full, most in held
+        for number in range(most)
+    ]
     fronts = {
         name: scene.chain.tcp_poses(node.departure[None])[0] for name, node in tending.nodes.items()
     }
-    return with_signals(cell, with_copies(cell, stations), fronts, finished)
+    standing = with_copies(cell, dict(enumerate([*places, ""], 1)))
+    slots = MachineSlots(cell, cycle).finished(empty=empty)
+    return with_signals(cell, standing, fronts, slots)
 
 
 class CycleSteps:
@@ -212,8 +225,7 @@ class CycleSteps:
         self._cycle = cycle
         self._context = context
         self._movements = movements
-        self._first = cycle.visits[0].activity
-        self._route = RouteSteps(request, tending, self._first, occupied(cycle))
+        self._route = RouteSteps(request, tending, cycle, empty=False)
         program = cycle_program(self._route.cell, cycle)
         self.cell: Cell = replace(self._route.cell, program=program)
         units = [visit.unit for visit in cycle.visits]
@@ -226,7 +238,7 @@ class CycleSteps:
 
     def run(self, cycles: int) -> tuple[Cell, tuple[PlannedMovement, ...]]:
         """The steps that fill the line from empty and make so many whole cycles, and their cell."""
-        route = RouteSteps(self._request, self._tending, self._first, ())
+        route = RouteSteps(self._request, self._tending, self._cycle, empty=True)
         program, units = run_program(route.cell, self._cycle, self._run_lengths(), cycles)
         steps = route.steps(program, units, self._movements, self._context)
         return replace(route.cell, program=program), steps
@@ -243,13 +255,13 @@ class CycleSteps:
             for a in range(count)
             for unit in units
         }
-        hops = {
-            ((a, unit), b): seconds[(ACROSS, visits[a + 1], visits[b], False), unit]
+        across = {
+            ((a, unit), b): ((ACROSS, visits[a + 1], visits[b], False), unit)
             for a in range(count)
             for b in range(count)
-            if b not in (a, a + 1)
             for unit in units
         }
+        hops = {hop: seconds[key] for hop, key in across.items() if key in seconds}
         return CycleLengths(activities, hops)
 
     def _along(self, cycle: SteadyCycle, nodes: Mapping[str, Sequence[StopNode]]) -> Choice:
@@ -294,33 +306,19 @@ class CycleSteps:
         """
         lengths = self._lengths(choice, found)
         visits = self._cycle.visits
-        cell = self._tending.cell
-        process = [cell.machine(name).process for name in machines_of(cell)]
-        order = [visit.activity for visit in visits]
-        count = len(order)
-        waits = np.zeros(count)
-        for _ in range(4 * count):
-            for k, activity in enumerate(order):
-                if activity == 0:
-                    continue
-                since = 0.0
-                i = (k - 1) % count
-                while order[i] != activity - 1:
-                    since += waits[i] + sum(lengths[i])
-                    i = (i - 1) % count
-                since += lengths[i][1]
-                waits[k] = max(process[activity] - since, 0.0)
-        period = float(waits.sum()) + sum(map(sum, lengths))
-        waits[0] += max(self._cycle.period - period, 0.0)
+        begins, period = soonest(self._cycle, lengths, self._machines())
         again = []
-        here = 0.0
-        for k, visit in enumerate(visits):
-            here += float(waits[k]) if k else 0.0
-            before = (ModeWait(MOTORS, float(waits[k])),) if waits[k] > 0.0 else ()
-            again.append(Visit(visit.activity, visit.unit, here, *lengths[k], before, ()))
-            here += sum(lengths[k])
-        period = max(period, self._cycle.period)
+        free = 0.0
+        for visit, (moving, hop), begin in zip(visits, lengths, begins, strict=True):
+            waited = begin - free if again else period - begins[-1] - sum(lengths[-1])
+            before = (ModeWait(MOTORS, waited),) if waited > _NO_WAIT else ()
+            again.append(Visit(visit.activity, visit.unit, begin, moving, hop, before, ()))
+            free = begin + moving + hop
         return replace(self._cycle, visits=tuple(again), period=period, joules=np.nan)
+
+    def _machines(self) -> list[Equipment]:
+        cell = self._tending.cell
+        return [cell.machine(name) for name in machines_of(cell)[1:-1]]
 
     def _lengths(
         self, choice: Choice, found: Mapping[HopPart, Movement]
@@ -340,3 +338,40 @@ class CycleSteps:
                 if part.hop == place:
                     lengths[visit][hopping[place]] += found[part].trajectory.duration
         return [(moving, hop) for moving, hop in lengths]
+
+
+def soonest(
+    cycle: SteadyCycle, lengths: Sequence[tuple[float, float]], machines: Sequence[Equipment]
+) -> tuple[list[float], float]:
+    """When the visits of a cycle begin [s] in the same order with other seconds of each and of the
+    hop after it, where the robot waits for machines only, and the period: no shorter than before.
+    """
+    program = LinearProgram()
+    busiest = max(cycle.units * machine.process / machine.capacity for machine in machines)
+    period = program.variable(max(cycle.period, busiest), cost=1.0)
+    begins = [program.variable(0.0, np.inf if k else 0.0) for k in range(len(lengths))]
+    for k, length in enumerate(lengths):
+        after = begins[k + 1] if k + 1 < len(lengths) else period
+        program.row({after: 1.0, begins[k]: -1.0}, low=sum(length))
+    places = {(visit.activity, visit.unit): k for k, visit in enumerate(cycle.visits)}
+    for visit in cycle.visits:
+        if visit.activity == 0:
+            continue
+        machine = machines[visit.activity - 1]
+        for before in range(cycle.units):  # parts that it finishes one after the other
+            unit = visit.unit - cycle.full[visit.activity - 1] - before * machine.capacity
+            load = places[visit.activity - 1, unit % cycle.units]
+            program.row(
+                {
+                    begins[places[visit.activity, visit.unit]]: 1.0,
+                    begins[load]: -1.0,
+                    period: -(unit // cycle.units),
+                },
+                low=lengths[load][0] + (before + 1) * machine.process,
+            )
+    shortest = program.relaxed().cost
+    program.cost = [float(k != period) for k in range(len(program.cost))]
+    program.low[period] = program.high[period] = shortest
+    values = program.solve().values
+    assert values is not None  # the cycle itself, slowed down
+    return [float(values[k]) for k in begins], shortest

@@ -59,7 +59,7 @@ _ROUNDING = 1e-6  # s: of the linear program
 _SLACK = 1.0005  # of the shortest period: the first point of the front
 _SAME = 1e-9  # s
 _CONTENTS_MAX = 2000  # ways in which machines can be full: a linear program each
-_ROUNDS = 20  # cycles after which a machine's queue is what it always is
+_PARTS_MAX = 24  # of a cycle in which parts take the slots of all machines in turn
 
 
 @dataclass(frozen=True)
@@ -76,11 +76,11 @@ class CyclePoint:
 
 @dataclass(frozen=True, eq=False)
 class SteadyPlan:
-    """cycle: the schedule; gap [%]: how far above the cheapest one it can be, for the
-    configurations that were chosen and movements that begin with an empty capacitor. program: its
-    movements and pauses, in `cell`. problem: what the cycle was chosen from. fastest [s]: the
-    shortest period. run: the program that fills the line and makes the cycles that were asked for,
-    in `run_cell`; None for none.
+    """cycle: the schedule, made until every slot of a machine has been used; gap [%]: how far above
+    the cheapest one it can be, for the configurations that were chosen and movements that begin
+    with an empty capacitor. program: its movements and pauses, in `cell`. problem: what the cycle
+    was chosen from. fastest [s]: the shortest period of a part. run: the program that fills the
+    line and makes the cycles that were asked for, in `run_cell`; None for none.
     """
 
     status: Status
@@ -102,21 +102,12 @@ class SteadyPlan:
     front: tuple[CyclePoint, ...] = field(default=())
 
     @property
-    def several(self) -> str:
-        """Which machines hold several parts at once, in words; "" for none."""
-        most = () if self.cycle is None else self.cycle.most
-        held = zip(self.machines[1:-1], most, strict=False)
-        return ", ".join(f"{name} holds {parts} parts" for name, parts in held if parts > 1)
-
-    @property
     def joules(self) -> float:
         """Joules a part; of a program with what the capacitor carries from one movement to the
         next.
         """
-        if self.cycle is None:
+        if self.cycle is None or self.program is None:
             return np.nan
-        if self.program is None:
-            return self.cycle.joules_per_part
         return self.program.report.energy / self.cycle.units
 
     def __repr__(self) -> str:
@@ -195,36 +186,22 @@ def robot_bars(plan: SteadyPlan) -> tuple[tuple[str, float, float, str], ...]:
     return tuple(bars)
 
 
-def _process_begins(plan: SteadyPlan, place: int) -> list[float]:
-    """When the machine at a place begins with the parts of a cycle [s]: when it has them, and is
-    finished with one of those before that it works on at once.
-    """
-    assert plan.cycle is not None
-    assert plan.problem is not None
-    loads = [v.start + v.seconds for v in plan.cycle.visits if v.activity == place - 1]
-    capacity = plan.problem.capacity[place - 1]
-    begins: list[float] = []
-    for round_ in range(_ROUNDS):
-        for load in loads:
-            here = round_ * plan.cycle.period + load
-            free = begins[-capacity] + plan.process[place - 1] if len(begins) >= capacity else here
-            begins.append(max(here, free))
-    return begins[-len(loads) :]
-
-
 def machine_bars(plan: SteadyPlan) -> dict[str, tuple[tuple[float, float], ...]]:
     """When each machine works in the cycle: begin and length [s]; over its end it goes on at its
     begin.
     """
     assert plan.cycle is not None
+    assert plan.problem is not None
     period = plan.cycle.period
     bars: dict[str, tuple[tuple[float, float], ...]] = {}
     for place, seconds in enumerate(plan.process, 1):
         if seconds == 0.0:
             continue
         pieces: list[tuple[float, float]] = []
-        for begin in _process_begins(plan, place):
-            begin %= period
+        queued = plan.cycle.queued(place - 1, seconds, plan.problem.capacity[place - 1])
+        loads = [visit for visit in plan.cycle.visits if visit.activity == place - 1]
+        for load in loads:
+            begin = (load.start + load.seconds + queued[load.unit]) % period
             left = seconds
             while left > 0.0:
                 pieces.append((begin, min(left, period - begin)))
@@ -275,6 +252,7 @@ def plan_steady_cycle(
                 f"{HOUR / fastest:.2f} are possible, one in {fastest:.2f} s",
             )
         model, chosen = ways.cheapest(max(period, fastest * _SLACK), units)
+        chosen = chosen.in_turn()
         notes.append(f"{chosen.cycle.period:.2f} s, {chosen.cycle.joules:.0f} J")
     plan = SteadyPlan(
         status=Status.success(),
@@ -288,27 +266,14 @@ def plan_steady_cycle(
         gap=chosen.gap,
         fastest=fastest,
     )
-    if max(chosen.cycle.most) > 1:
-        _refuse_program(plan, saving=saving, cycles=cycles)
-    else:
-        try:
-            plan = _with_program(plan, model, chosen, context, saving=saving, cycles=cycles)
-        except StageError as failed:
-            return SteadyPlan(failed.status, journal.info(request.start, context.joint_names))
+    try:
+        plan = _with_program(plan, model, chosen, context, saving=saving, cycles=cycles)
+    except StageError as failed:
+        return SteadyPlan(failed.status, journal.info(request.start, context.joint_names))
     if front_points:
         with journal.stage("front"):
             plan = replace(plan, front=_front(ways, fastest, front_points, units))
     return replace(plan, info=journal.info(request.start, context.joint_names))
-
-
-def _refuse_program(plan: SteadyPlan, *, saving: bool, cycles: int) -> None:
-    """Raise RequestError where more than a schedule is asked for."""
-    asked = "saving" if saving else "cycles" if cycles else ""
-    if asked:
-        raise RequestError(
-            StatusCode.INVALID_GOAL_CONSTRAINTS,
-            f"{asked} needs a program, and there is a schedule alone: {plan.several}",
-        )
 
 
 def _with_program(
@@ -351,6 +316,26 @@ class _Chosen:
     def gap(self) -> float:
         return 100.0 * max(self.cycle.joules - self.bound, 0.0) / self.cycle.joules
 
+    def in_turn(self) -> _Chosen:
+        """The same made until every slot of a machine has been used. Raises RequestError where that
+        takes too many parts.
+        """
+        turns = self.cycle.turns
+        units = self.cycle.units
+        if turns * units > _PARTS_MAX:
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"machines hold {', '.join(map(str, self.cycle.most))} parts, so it takes "
+                f"{turns * units} parts until all have used their slots in turn, at most "
+                f"{_PARTS_MAX} are planned: give machines a capacity or a buffer of like numbers",
+            )
+        movements = {
+            (key, turn * units + unit): movement
+            for (key, unit), movement in self.movements.items()
+            for turn in range(turns)
+        }
+        return _Chosen(self.cycle.repeated(turns), movements, turns * self.bound)
+
 
 class _TendingModel:
     """The linear problem of a route, and its solutions as certified movements."""
@@ -370,7 +355,7 @@ class _TendingModel:
             for name, node in tending.nodes.items()
         }
         machines = [cell.machine(name) for name in machines_of(cell)[1:-1]]
-        self._room = [np.inf, *(each.capacity + each.buffer for each in machines), np.inf]
+        self._room = [np.inf, *(each.places for each in machines), np.inf]
         ways = np.prod([1.0 + room for room in self._room[1:-1]])
         if ways > _CONTENTS_MAX:
             raise RequestError(

@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_description import Cell
+from ir_description.cell import begin_of_work
 from ir_msgs_py.modes import modes_of
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError, unknown_name
 from ir_planner.flexible.steady_plan import SteadyPlan
-from ir_planner.flexible.tending_cell import done_of, machines_of, route_of, start_of
+from ir_planner.flexible.tending_cell import route_of
 from ir_planner.program import Rests, Scenes, Steps, Timeouts, rests_at
 from ir_values.arrays import FloatArray
 
@@ -91,11 +92,12 @@ class Replay:
         drives = request.settings.drives(self._cell.robot)
         places = self._cell.parts_at_start()
         self._scene = Scenes(self._cell, request.power, drives).of(places)
-        times = {name: self._cell.machine(name).process for name in machines_of(self._cell)[1:-1]}
-        names = [name for name, seconds in times.items() if seconds > 0.0]
-        self._assumed = {name: times[name] for name in names}
-        self._starts = {start_of(name): name for name in names}
-        self._answers = {done_of(name): name for name in names}
+        ends = [signal for signal in self._cell.signals if signal.process]
+        machines = {signal.process: self._cell.machine(signal.process) for signal in ends}
+        self._assumed = {name: machine.process for name, machine in machines.items()}
+        self._capacities = {name: machine.capacity for name, machine in machines.items()}
+        self._starts = {signal.follows: signal.process for signal in ends}
+        self._answers = {signal.name: signal.follows for signal in ends}
         self._begins = np.concatenate(([0.0], np.cumsum([s.duration for s in self._steps])))
 
     @property
@@ -114,30 +116,31 @@ class Replay:
         """The parts with these times. lengths (n,) [s]: equally likely lengths of late waits, that
         the timeouts are found for.
         """
-        line = _Followed({name: iter(values) for name, values in times.items()}, self._assumed)
+        line = _Followed({name: iter(values) for name, values in times.items()}, self._capacities)
         q = np.zeros(self._cell.robot.n)
         last = route_of(self._cell).visits[-1]
         for index, step in enumerate(self._steps):
             for text in step.wait_for:
-                name = self._answers.get(text)
-                if name is not None:
-                    wait = max(line.ready[name] - line.now, 0.0)
+                start = self._answers.get(text)
+                if start is not None:
+                    wait = max(line.ready.get(start, 0.0) - line.now, 0.0)
                     line.late(*self._late(wait, policy, lengths, self._rests(q)))
             if step.trajectory is not None:
                 q = step.trajectory.positions[-1]
             seconds = step.duration
             joules = step.report.energy
             if step.since in self._starts:
-                name = self._starts[step.since]
-                end = line.started[name] + self._begins[index + 1] - line.planned[name]
+                end = float(line.started.get(step.since, 0.0) + self._begins[index + 1])
+                end -= line.planned.get(step.since, 0.0)
                 if policy == KNOWN:
-                    end += line.drawn[name] - self._assumed[name]
+                    assumed = self._assumed[self._starts[step.since]]
+                    end += line.drawn.get(step.since, assumed) - assumed
                 seconds = max(end - line.now, 0.0)
                 joules = self._paused(step, seconds, policy, self._rests(q))
             line.spend(seconds, joules)
             for text in step.set_signals:
                 if text in self._starts:
-                    line.start(self._starts[text], float(self._begins[index + 1]))
+                    line.start(self._starts[text], text, float(self._begins[index + 1]))
             if step.detach and step.to_station == last:
                 line.delivered()
         return tuple(line.parts)
@@ -170,16 +173,20 @@ class Replay:
 
 
 class _Followed:
-    """A run while it is followed: now, and what the part since the last one took."""
+    """A run while it is followed: now, what the part since the last one took, and by the signal
+    that starts a machine what came of it last.
+    """
 
-    def __init__(self, times: dict[str, Iterator[float]], assumed: Mapping[str, float]) -> None:
+    def __init__(self, times: dict[str, Iterator[float]], capacities: Mapping[str, int]) -> None:
         self._times = times
+        self._capacities = capacities
         self.now = 0.0
         self.parts: list[ReplayedPart] = []
-        self.started = dict.fromkeys(assumed, 0.0)
-        self.planned = dict.fromkeys(assumed, 0.0)
-        self.ready = dict.fromkeys(assumed, 0.0)
-        self.drawn = dict(assumed)
+        self.started: dict[str, float] = {}
+        self.planned: dict[str, float] = {}
+        self.ready: dict[str, float] = {}
+        self.drawn: dict[str, float] = {}
+        self._ends: dict[str, list[float]] = {}
         self._begin = 0.0
         self._joules = 0.0
         self._late = 0.0
@@ -194,12 +201,15 @@ class _Followed:
         self.spend(seconds, joules)
         self._late += seconds
 
-    def start(self, name: str, planned: float) -> None:
-        """A machine begins with a part now, by the plan at `planned` s."""
-        self.drawn[name] = next(self._times[name])
-        self.started[name] = self.now
-        self.planned[name] = planned
-        self.ready[name] = self.now + self.drawn[name]
+    def start(self, name: str, signal: str, planned: float) -> None:
+        """A machine is started by a signal now, by the plan at `planned` s."""
+        self.drawn[signal] = next(self._times[name])
+        self.started[signal] = self.now
+        self.planned[signal] = planned
+        ends = self._ends.setdefault(name, [])
+        begin = begin_of_work(self.now, ends, self._capacities[name])
+        self.ready[signal] = begin + self.drawn[signal]
+        ends.append(self.ready[signal])
 
     def delivered(self) -> None:
         """A part has left."""

@@ -54,7 +54,6 @@ def with_copies(cell: Cell, stations: Mapping[int, str]) -> Cell:
         parts=(*cell.parts, *copies),
         stations=tuple(_with_contacts(each, original, stations) for each in cell.stations),
         program=(),
-        route=None,
     )
 
 
@@ -142,17 +141,17 @@ def front_name(station: str) -> str:
 
 
 def transport(
-    cell: Cell, place: int, part: str, *, finished: bool, start: bool
+    cell: Cell, place: int, part: str, *, taken_from: str, brought_to: str
 ) -> tuple[ProgramStep, ...]:
     """The part at a place of the route is taken and brought to the next one; the robot ends in
-    front of it. finished: it waits for the machine before; start: it starts the one after.
+    front of it. taken_from: the slot of the machine whose work it waits for, brought_to: the one
+    that it starts; "": no machine works there.
     """
     route = route_of(cell)
-    names = machines_of(cell)
     here = route.visits[place + 1]
-    wait = (Signal(done_of(names[place])),) if finished else ()
-    taken = (Signal(start_of(names[place]), False),) if finished else ()
-    begun = (Signal(start_of(names[place + 1])),) if start else ()
+    wait = (Signal(done_of(taken_from)),) if taken_from else ()
+    taken = (Signal(start_of(taken_from), False),) if taken_from else ()
+    begun = (Signal(start_of(brought_to)),) if brought_to else ()
     time = route.handling
     return (
         ProgramStep("STATION", route.visits[place], time, part, wait_for=wait, set_signals=taken),
@@ -170,14 +169,21 @@ def pause_steps(waits: Iterable[tuple[float, str]]) -> list[ProgramStep]:
     ]
 
 
-def start_of(machine: str) -> str:
-    """The signal that starts a machine; cleared when its part has been taken."""
-    return f"{machine}.start"
+def slot_name(machine: str, number: int, most: int) -> str:
+    """The slot of a machine in which a part of that number is, where it holds `most` parts, which
+    take its slots in turn; one slot alone has the machine's name.
+    """
+    return machine if most == 1 else f"{machine}.{number % most + 1}"
 
 
-def done_of(machine: str) -> str:
-    """The signal by which a machine says that its part is finished."""
-    return f"{machine}.done"
+def start_of(slot: str) -> str:
+    """The signal that starts a machine with the part in a slot; cleared when that was taken."""
+    return f"{slot}.start"
+
+
+def done_of(slot: str) -> str:
+    """The signal by which a machine says that the part in a slot is finished."""
+    return f"{slot}.done"
 
 
 def machines_of(cell: Cell) -> tuple[str, ...]:
@@ -186,35 +192,35 @@ def machines_of(cell: Cell) -> tuple[str, ...]:
 
 
 def with_signals(
-    cell: Cell, standing: Cell, fronts: Mapping[str, FloatArray], finished: Iterable[int]
+    cell: Cell,
+    standing: Cell,
+    fronts: Mapping[str, FloatArray],
+    slots: Mapping[str, Mapping[str, bool]],
 ) -> Cell:
     """The cell with its parts as they are `standing`, the places in front of its stations (poses
-    (4, 4) of the tcp in the cell), and the signals of its machines. finished: places whose part is
-    when the program begins. Numbers of signals that the cell has are kept.
+    (4, 4) of the tcp in the cell), and the signals of the slots of its machines, by machine.
+    Whether a slot has a finished part when the program begins is said there. Numbers of signals
+    that the cell has are kept.
     """
-    names = machines_of(cell)
-    route = route_of(cell)
     stations = list(standing.stations)
     for name, pose in fronts.items():
         own = cell.station(name)
         inside = _within(cell.machine(own.equipment).pose, pose)
         stations.append(Station(front_name(name), own.equipment, pose, own.zone, inside))
     signals = {signal.name: signal for signal in standing.signals}
-    done = tuple(finished)
-    for place in range(1, len(route.visits) - 1):
-        if not cell.machine(names[place]).process:
-            continue
-        start = start_of(names[place])
-        end = done_of(names[place])
-        signals[start] = replace(signals.get(start, CellSignal(start)), initial=place in done)
-        signals[end] = replace(
-            signals.get(end, CellSignal(end)),
-            initial=place in done,
-            follows=start,
-            delay=0.0,
-            process=names[place],
-        )
-    return replace(standing, stations=tuple(stations), signals=tuple(signals.values()), route=route)
+    for machine, own_slots in slots.items():
+        for slot, finished in own_slots.items():
+            start = start_of(slot)
+            end = done_of(slot)
+            signals[start] = replace(signals.get(start, CellSignal(start)), initial=finished)
+            signals[end] = replace(
+                signals.get(end, CellSignal(end)),
+                initial=finished,
+                follows=start,
+                delay=0.0,
+                process=machine,
+            )
+    return replace(standing, stations=tuple(stations), signals=tuple(signals.values()))
 
 
 def _within(frame: FloatArray, pose: FloatArray) -> FloatArray:

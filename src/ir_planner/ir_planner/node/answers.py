@@ -154,21 +154,18 @@ def fill_program(response: Any, plan: ProgramPlan, include_points: bool) -> None
 
 
 def fill_steady_cycle(response: Any, plan: SteadyPlan, include_points: bool) -> None:
-    """plan_steady_cycle: the program is that of the run where one was asked for, none where there
-    is a schedule alone.
-    """
+    """plan_steady_cycle: the program is that of the run where one was asked for."""
     response.info = planning_info_to_msg(plan.info)
     program = plan.run or plan.program
     cell = plan.run_cell or plan.cell
-    if plan.cycle is None:
+    if plan.cycle is None or program is None or cell is None:
         return
-    if program is not None and cell is not None:
-        response.program_id = program.program_id
-        response.movements = [
-            planned_movement_to_msg(movement, include_points) for movement in program.movements
-        ]
-        response.report = report_to_msg(program.report)
-        response.cell = cell_to_yaml(cell)
+    response.program_id = program.program_id
+    response.movements = [
+        planned_movement_to_msg(movement, include_points) for movement in program.movements
+    ]
+    response.report = report_to_msg(program.report)
+    response.cell = cell_to_yaml(cell)
     response.steps = [
         CycleStepMsg(
             kind=step.kind,

@@ -363,12 +363,13 @@ def scene_with(
     tool = {cell.tool.name: cell.tool} if cell.tool is not None else {}
     held = [name for name in names if name not in tool]
     _check_load(cell, names, held)
-    parts = tuple(replace(part, station="") if part.name in held else part for part in cell.parts)
+    start = cell.parts_at_start()
+    lying = {**start.lying, **dict.fromkeys(held, "")}
     loads = (
         *(tool[name] for name in names if name in tool),
         *(cell.part(name).held(cell.tcp) for name in held),
     )
-    standing = cell if not held else replace(cell, parts=parts, program=(), route=None)
+    standing = with_parts(cell, replace(start, lying=lying)) if held else cell
     return PlanningScene(standing, loads, power, drives or Drives())
 
 

@@ -8,7 +8,7 @@ from it: they keep their own.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -60,15 +60,14 @@ def step_clearances(
 
 def places_after(cell: Cell, places: PartPlaces, movement: PlannedMovement) -> PartPlaces:
     """Where the parts are after a step that ended."""
-    lying = dict(places.lying)
     parts = {part.name for part in cell.parts}
     if movement.attach in parts:
-        return replace(places, held=movement.attach, lying={**lying, movement.attach: ""})
+        return places.taken(movement.attach)
     if movement.detach in parts:
         stations = {station.name for station in cell.stations}
-        station = movement.to_station if movement.to_station in stations else ""
-        put = places.supplied({**lying, movement.detach: station})
-        return replace(places, held="", lying=put)
+        return places.put(
+            movement.detach, movement.to_station if movement.to_station in stations else ""
+        )
     return places
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ir_description import Cell
+from ir_description.cell import CellSignal, begin_of_work
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.report import PlannedMovement
 
@@ -60,9 +61,12 @@ class Span:
 
 @dataclass(frozen=True)
 class MachineTimes:
-    """When a machine worked, and when its finished part lay there until the robot took it."""
+    """When a machine worked on the parts in a slot, and when a finished part lay there until the
+    robot took it. slot: from 1 on where the machine holds several parts, else 0.
+    """
 
     name: str
+    slot: int
     working: tuple[Span, ...]
     finished: tuple[Span, ...]
 
@@ -146,10 +150,11 @@ def _row(
         for name in dict.fromkeys(answers[each] for each in names if each in answers):
             if step.start - step.begin > SHORT:
                 late[name] = late.get(name, 0.0) + step.start - step.begin
-    finished = {
-        machine.name: sum(each.within(span.begin, span.end) for each in machine.finished)
-        for machine in machines
-    }
+    finished = dict.fromkeys((machine.name for machine in machines), 0.0)
+    for machine in machines:
+        finished[machine.name] += sum(
+            each.within(span.begin, span.end) for each in machine.finished
+        )
     return PartRow(
         number,
         span,
@@ -165,30 +170,54 @@ def _row(
 def _machines(cell: Cell, signals: Iterable[SignalChange], end: float) -> tuple[MachineTimes, ...]:
     changes = sorted(signals, key=lambda change: change.time)
     result = []
-    for signal in cell.signals:
-        if not signal.process:
-            continue
-        begun = np.inf
-        done = 0.0 if signal.initial else np.inf
-        working = []
-        finished = []
-        for change in changes:
-            if change.name == signal.follows and change.value:
-                begun = change.time
-            elif change.name == signal.name and change.value:
-                if np.isfinite(begun):
-                    working.append(Span(begun, change.time))
-                begun = np.inf
-                done = change.time
-            elif change.name == signal.follows and np.isfinite(done):
-                finished.append(Span(done, change.time))
-                done = np.inf
-        if np.isfinite(begun):
-            working.append(Span(begun, end))
-        if np.isfinite(done):
-            finished.append(Span(done, end))
-        result.append(MachineTimes(signal.process, tuple(working), tuple(finished)))
+    for name in dict.fromkeys(signal.process for signal in cell.signals if signal.process):
+        reports = [signal for signal in cell.signals if signal.process == name]
+        slots = [_slot(signal, changes, end) for signal in reports]
+        every = [span for loaded, _ in slots for span in loaded]
+        begun = _begun(every, cell.machine(name).capacity)
+        for number, (loaded, finished) in enumerate(slots, 1):
+            working = tuple(Span(begun[span], span.end) for span in loaded)
+            slot = number if len(slots) > 1 else 0
+            result.append(MachineTimes(name, slot, working, tuple(finished)))
     return tuple(result)
+
+
+def _slot(
+    signal: CellSignal, changes: Iterable[SignalChange], end: float
+) -> tuple[list[Span], list[Span]]:
+    """From when a part was there until it was finished, and from then until it was taken."""
+    begun = np.inf
+    done = 0.0 if signal.initial else np.inf
+    loaded = []
+    finished = []
+    for change in changes:
+        if change.name == signal.follows and change.value:
+            begun = change.time
+        elif change.name == signal.name and change.value:
+            if np.isfinite(begun):
+                loaded.append(Span(begun, change.time))
+            begun = np.inf
+            done = change.time
+        elif change.name == signal.follows and np.isfinite(done):
+            finished.append(Span(done, change.time))
+            done = np.inf
+    if np.isfinite(begun):
+        loaded.append(Span(begun, end))
+    if np.isfinite(done):
+        finished.append(Span(done, end))
+    return loaded, finished
+
+
+def _begun(loaded: Iterable[Span], capacity: int) -> dict[Span, float]:
+    """When the work on each part in a machine began: when it was there, and the machine had
+    finished one of the others.
+    """
+    begun = {}
+    ends: list[float] = []
+    for span in sorted(loaded, key=lambda each: each.begin):
+        begun[span] = min(begin_of_work(span.begin, ends, capacity), span.end)
+        ends.append(span.end)
+    return begun
 
 
 def _filling(rows: Sequence[PartRow], machines: Sequence[MachineTimes]) -> int:

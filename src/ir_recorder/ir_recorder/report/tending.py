@@ -85,7 +85,7 @@ def _figure(part: PartRow, tending: Tending, power: PowerSeries | None) -> str:
     for machine in tending.machines:
         bars = [("loaded", span, "at work") for span in machine.working]
         bars += [("empty", span, "finished, waits for the robot") for span in machine.finished]
-        chart.lane(machine.name, bars)
+        chart.lane(f"{machine.name} {machine.slot or ''}".strip(), bars)
     if power is not None and len(power.time) > 1:
         chart.power([power])
     said = f"part {part.number}: {seconds(part.span.seconds)}, {watt_hours(part.joules)}"

@@ -171,7 +171,8 @@ _THERE = 0.01  # m: twice the tube that the tool is kept in
 
 class Parts:
     """Parts of `cell`; a part lies as it was held when the tcp stood at its place (4, 4). Where the
-    cell has a route, parts come to its first station and go from its last one by themselves.
+    cell has a route, parts come to its first station and go from its last one by themselves, and a
+    machine that holds several takes them in.
     """
 
     def __init__(self, cell: Cell, load: Carried) -> None:
@@ -181,10 +182,13 @@ class Parts:
         """Parts of another cell lie where that says, but for those that are held."""
         self.cell = cell
         self._held = _parts_of(load)
+        start = cell.parts_at_start()
+        self._inside = start.inside.keys() - self._held
+        self._rooms = [cell.station(name).pose for name in start.rooms]
         self._places = {
-            part.name: cell.station(part.station).pose
-            for part in cell.parts
-            if part.station and part.name not in self._held
+            name: cell.station(station).pose
+            for name, station in start.lying.items()
+            if station and name not in self._held
         }
 
     def carry(self, load: Carried, tcp: FloatArray) -> None:
@@ -196,19 +200,24 @@ class Parts:
                 self._places[name] = tcp
         for name in held:
             self._places.pop(name, None)
+        self._inside -= held
         released = self._held - held
         self._held = held
         if released and self.cell.route is not None:
             self._supply(self.cell.route)
 
     def _supply(self, route: PartRoute) -> None:
-        """What lies at the last station is taken away; the next part comes to the first one when
-        one was put down elsewhere.
+        """What lies at the last station is taken away, what lies at a machine for several is in it;
+        the next part comes to the first station when one was put down elsewhere.
         """
         first, last = (self.cell.station(name).pose for name in (route.visits[0], route.visits[-1]))
-        for name in [name for name, place in self._places.items() if _same(place, last)]:
-            del self._places[name]
-        there = self._held | self._places.keys()
+        for name, place in list(self._places.items()):
+            room = any(_same(place, station) for station in self._rooms)
+            if room or _same(place, last):
+                del self._places[name]
+            if room:
+                self._inside.add(name)
+        there = self._held | self._places.keys() | self._inside
         absent = (part.name for part in self.cell.parts if part.name not in there)
         following = route.following(absent)
         if following and not any(_same(place, first) for place in self._places.values()):

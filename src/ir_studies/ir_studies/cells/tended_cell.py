@@ -35,12 +35,8 @@ _LENGTHS = 2000  # of waits at which power modes are compared
 
 def tended_instance(plan: SteadyPlan) -> Instance:
     """The cell of a plan at its period. Raises SettingsError for a cycle of several units, which
-    the format can't say without naming every part, and where a machine holds several parts.
+    the format can't say without naming every part: where a machine holds several parts, too.
     """
-    if plan.several:
-        raise SettingsError(
-            f"only machines that hold one part at a time are written: {plan.several}"
-        )
     if plan.cycle is None or plan.problem is None or plan.cell is None:
         raise SettingsError(f"there is no cycle to write: {plan.status.message}")
     if plan.cycle.units > 1:
