@@ -4,13 +4,17 @@ interfaces.
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 import pytest
+from rclpy.action import ActionClient
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
 from ir_msgs.action import RunProgram
 from ir_msgs.msg import PowerState
+from ir_msgs.srv import Recover, SetPlcInput
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.plc import send_packet
@@ -83,6 +87,47 @@ def test_a_program_with_every_power_mode_runs_on_the_driver(client):
     assert result.executed == len(program)
     assert result.energy > 0.0
     assert {Mode.MOVING, Mode.BUS_POWER_OFF, Mode.HIBERNATION, Mode.STAND_ON_BRAKES} <= set(modes)
+
+
+def test_a_program_asked_for_before_a_stop_is_not_run_after_it(
+    client, ros_executor, ros_node, wait_for
+):
+    """However late the runner takes it: its process was suspended, say."""
+    state = client.next_message("/joint_states", JointState)
+    here = np.array([state.position[list(state.name).index(name)] for name in JOINT_NAMES])
+    there = here + 0.1 * np.eye(6)[0]
+    goal = RunProgram.Goal(movements=[planned_movement_to_msg(move(here, there))])
+    asking = ActionClient(ros_node, RunProgram, "/ir_program_runner/run_program")
+    wait_for(asking.server_is_ready, what="the runner is there")
+    client.send_goal("/ir_program_runner/run_program", RunProgram.Goal(program_id="none"))
+    accepted = []
+    suspended = threading.Event()
+    goes_on = threading.Event()
+
+    def ask_and_suspend():
+        accepted.append(asking.send_goal_async(goal))
+        suspended.set()
+        goes_on.wait(PATIENCE)
+
+    threading.Thread(target=lambda: ros_executor.run(ask_and_suspend)).start()
+    wait_for(suspended.is_set, what="the runner's executor is held")
+    press(client, True)
+    press(client, False)
+    client.ask("/ir_sim_driver/recover", Recover.Request())
+    goes_on.set()
+    wait_for(accepted[0].done, what="the goal is accepted")
+    ended = ros_executor.run(accepted[0].result().get_result_async)
+    wait_for(ended.done, what="it ends")
+    assert ended.result().result.status.code == StatusCode.INVALID_ROBOT_STATE
+    assert "ended the program" in ended.result().result.status.message
+    again = client.send_goal("/ir_program_runner/run_program", goal, timeout=PATIENCE)
+    assert again.status.code == StatusCode.SUCCESS, again.status.message
+
+
+def press(client, value):
+    request = SetPlcInput.Request(name="emergency_stop", value=value)
+    answer = client.ask("/ir_sim_driver/set_plc_input", request)
+    assert answer.status.code == StatusCode.SUCCESS
 
 
 def move(start, end):

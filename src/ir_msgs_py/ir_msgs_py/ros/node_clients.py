@@ -98,7 +98,8 @@ class DriverClient:
     something is asked
     of it: a node that waits for nothing is not woken a hundred times a second.
     timers: those of the controller, None before they came. stops: number of the last stop, and
-    stop_latched: whether it is latched; None before they came.
+    stop_latched: whether it is latched; None before they came. stop_heard: called when a number
+    has come.
     """
 
     def __init__(
@@ -110,8 +111,10 @@ class DriverClient:
         response_timeout: float = 2.0,
         silence_timeout: float = 2.0,
         cancel_timeout: float = 5.0,
+        stop_heard: Callable[[], None] = lambda: None,
     ) -> None:
         self.name = name
+        self._stop_heard = stop_heard
         self._mode: Mode | None = None
         self.timers: ControllerTimers | None = None
         self._energy = 0.0
@@ -291,6 +294,7 @@ class DriverClient:
 
     def _read_stops(self, message: UInt64) -> None:
         self.stops = int(message.data)
+        self._stop_heard()
         self._waiting.look()
 
     def _read_latched(self, message: Bool) -> None:

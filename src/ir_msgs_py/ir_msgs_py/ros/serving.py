@@ -333,15 +333,30 @@ class BoundedService(Waitable):
 
 
 class RecordedActionServer(PatientActionServer):
-    """An action server whose goals and results are published for recordings."""
+    """An action server whose goals and results are published for recordings.
+
+    came: is told the id of a goal when it is taken from the middleware, also by `take_waiting`,
+    which may be long before it is accepted.
+    """
 
     def __init__(
-        self, node: Node, action_type: Any, name: str, *arguments: Any, **options: Any
+        self,
+        node: Node,
+        action_type: Any,
+        name: str,
+        *arguments: Any,
+        came: Callable[[bytes], None] = lambda goal_id: None,
+        **options: Any,
     ) -> None:
+        self._came = came
         self._calls = Calls.of(node)
         self._type_text = type_name(action_type)
         self._full_name = node.resolve_topic_name(name)
         super().__init__(node, action_type, name, *arguments, **options)
+
+    def goal_came(self, request_id: Any, request: Any) -> None:
+        """Tell of the goal."""
+        self._came(bytes(request.goal_id.uuid))
 
     def register_execute_callback(self, execute_callback: Any) -> None:
         """Let a goal be executed by this callback where it names none."""

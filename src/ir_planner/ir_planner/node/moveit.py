@@ -44,7 +44,7 @@ from ir_msgs_py.ros.node_process import run_node
 from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.ros.serving import ANY, BoundedService, RecordedActionServer, unexpected
 from ir_msgs_py.ros.spinning import Cancellation
-from ir_msgs_py.ros.topics import ACTION_SERVICES, LATCHED, LatestMessage
+from ir_msgs_py.ros.topics import ACTION_SERVICES, BURST, LATCHED, LatestMessage
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.errors import PlannerError, RequestError
 from ir_planner.node.goal_queue import GoalQueue
@@ -422,6 +422,7 @@ class MoveItNode(Node):
         plans = MutuallyExclusiveCallbackGroup()
         questions = MutuallyExclusiveCallbackGroup()
         self._executor = TrajectoryExecution(self._drive, answers.check_begin)
+        self._actions: list[RecordedActionServer] = []
         self._hear_stops(parameters.value.controller.rpartition("/")[0])
         apply = self._guarded(SERVICES["ApplyPlanningScene"], answers.apply_scene)
         self._monitor = SceneMonitor(
@@ -463,7 +464,7 @@ class MoveItNode(Node):
             answers.check_start,
             self._executor,
         )
-        self._actions = [
+        self._actions += [
             self._offer_action("MoveGroup", move.run),
             self._offer_action("ExecuteTrajectory", self._execute),
         ]
@@ -475,6 +476,8 @@ class MoveItNode(Node):
             topic = f"{driver}/{name.rpartition('/')[2]}"
 
             def hear(message: Any, topic: str = topic) -> None:
+                for action in self._actions:
+                    action.take_waiting(BURST)  # what waits now was sent before the stop
                 self._executor.hear(topic, int(message.data))
 
             self.create_subscription(kind, topic, hear, LATCHED, callback_group=group)
@@ -528,6 +531,7 @@ class MoveItNode(Node):
             ACTIONS[kind],
             goals.execute,
             handle_accepted_callback=accept,
+            came=accepted.came,
             cancel_callback=cancel,
             callback_group=ReentrantCallbackGroup(),
             **ACTION_SERVICES,
