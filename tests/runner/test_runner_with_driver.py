@@ -27,6 +27,7 @@ from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_program_runner.node import ProgramRunnerNode
 from ir_sim_driver.node import SimDriver
+from ir_values.errors import RequestRefusedError
 
 TRANSITIONS = {  # s: enter, leave, shortest stay
     "bus_power_off": (0.2, 0.4, 0.1),
@@ -99,7 +100,7 @@ def test_a_program_asked_for_before_a_stop_is_not_run_after_it(
     goal = RunProgram.Goal(movements=[planned_movement_to_msg(move(here, there))])
     asking = ActionClient(ros_node, RunProgram, "/ir_program_runner/run_program")
     wait_for(asking.server_is_ready, what="the runner is there")
-    client.send_goal("/ir_program_runner/run_program", RunProgram.Goal(program_id="none"))
+    client.send_goal("/ir_program_runner/run_program", RunProgram.Goal())
     accepted = []
     suspended = threading.Event()
     goes_on = threading.Event()
@@ -113,7 +114,7 @@ def test_a_program_asked_for_before_a_stop_is_not_run_after_it(
     wait_for(suspended.is_set, what="the runner's executor is held")
     press(client, True)
     press(client, False)
-    client.ask("/ir_sim_driver/recover", Recover.Request())
+    wait_for(lambda: recovers(client), what="the button is released for the debounce")
     goes_on.set()
     wait_for(accepted[0].done, what="the goal is accepted")
     ended = ros_executor.run(accepted[0].result().get_result_async)
@@ -122,6 +123,14 @@ def test_a_program_asked_for_before_a_stop_is_not_run_after_it(
     assert "ended the program" in ended.result().result.status.message
     again = client.send_goal("/ir_program_runner/run_program", goal, timeout=PATIENCE)
     assert again.status.code == StatusCode.SUCCESS, again.status.message
+
+
+def recovers(client):
+    try:
+        client.ask("/ir_sim_driver/recover", Recover.Request())
+    except RequestRefusedError:
+        return False
+    return True
 
 
 def press(client, value):
