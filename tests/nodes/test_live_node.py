@@ -55,7 +55,9 @@ class Browser:
                     self.state.update(record)
                     self.records.append(record)
 
-    def press(self, name: str, value: bool) -> dict[str, Any]:
+    def press(self, name: str, level: bool, stop: str | None = None) -> dict[str, Any]:
+        seen = self.state.get("stop", "") if stop is None else stop
+        value = {"level": level, "stop": seen}
         connection = HTTPConnection("127.0.0.1", self._port, timeout=PATIENCE)
         headers = {"X-Live-Token": self._token, "Content-Type": "application/json"}
         connection.request("POST", "/press", json.dumps({"name": name, "value": value}), headers)
@@ -126,6 +128,13 @@ def test_a_driver_is_seen_obeys_the_buttons_and_may_go_and_come(
         assert browser.press("move_enable", False)["done"]  # the button `hold`
         wait_for(lambda: not state["in"]["ab"] and not state["in"]["move_enable"])
         assert "no bit of the PLC" in browser.press("EXT", True)["sentence"]
+        before = state["stop"]
+        assert browser.press("emergency_stop", True, "")["done"]  # whatever the page has seen
+        wait_for(lambda: state["stop"] != before, what="the page shows the stop")
+        for late in ("", before):
+            assert not browser.press("emergency_stop", False, late)["done"]
+        assert "which the sender knows" in browser.press("conf_mess", True, before)["sentence"]
+        assert browser.press("emergency_stop", False)["done"]
     wait_for(lambda: not state["heard"]["driver"], what="the driver has gone")
     wait_for(lambda: state["w"] is None and state["near"] is None)
     with a_driver(ros_context):

@@ -27,7 +27,15 @@ from ir_recorder.live.server import (
 )
 from ir_recorder.live.stream import Stream
 
-PRESSED = json.dumps({"name": "ab", "value": True})
+SEEN = "1795973304123000002"
+
+
+def level(value: bool) -> dict[str, Any]:
+    """What a button asks for: a level, by who has seen this stop."""
+    return {"level": value, "stop": SEEN}
+
+
+PRESSED = json.dumps({"name": "ab", "value": level(True)})
 
 
 class Cell:
@@ -113,7 +121,7 @@ def test_own_pages_are_answered_under_both_names(cell: Cell) -> None:
             cell.post(Host=host, Origin=f"http://{host}", Sec_Fetch_Site="same-origin").status
             == 200
         )
-    assert cell.pressed == [("ab", True)] * 2
+    assert cell.pressed == [("ab", level(True))] * 2
 
 
 def test_a_button_needs_the_token_and_a_request_that_makes_sense(cell: Cell) -> None:
@@ -128,6 +136,10 @@ def test_a_button_needs_the_token_and_a_request_that_makes_sense(cell: Cell) -> 
         "{",
         '{"name": 1, "value": true}',
         '{"name": "ab", "value": 1}',
+        '{"name": "ab", "value": true}',
+        '{"name": "ab", "value": {"level": true}}',
+        '{"name": "ab", "value": {"level": true, "stop": 3}}',
+        '{"name": "ab", "value": {"level": true, "stop": "99999999999999999999"}}',
         "[" * 900,
     ):
         assert cell.post(body).status == 400
@@ -135,15 +147,16 @@ def test_a_button_needs_the_token_and_a_request_that_makes_sense(cell: Cell) -> 
     assert cell.post(Content_Length="-1").status == 400
     assert cell.ask("POST", "/", "{}", X_Live_Token=cell.server.guard.token).status == 403
     assert cell.ask("DELETE", "/").status == 501
-    assert cell.pressed == [("ab", True)]
+    assert cell.pressed == [("ab", level(True))]
 
 
 def test_what_is_no_bit_is_refused_and_too_many_at_once_too() -> None:
     commands = Commands()
-    assert not commands.press("reboot", True).done
-    assert all(name in commands.press("<b>", True).sentence for name in BITS)
+    assert not commands.press("reboot", level(True)).done
+    assert all(name in commands.press("<b>", level(True)).sentence for name in BITS)
     waiting = [
-        threading.Thread(target=commands.press, args=("ab", True)) for _ in range(MOST_WAITING)
+        threading.Thread(target=commands.press, args=("ab", level(True)))
+        for _ in range(MOST_WAITING)
     ]
     for thread in waiting:
         thread.start()
@@ -241,7 +254,7 @@ def test_a_stop_finds_a_place_among_waiting_requests_and_refuses_what_was_asked_
     answers: list[ButtonAnswer] = []
 
     def ask(name: str, value: bool) -> threading.Thread:
-        thread = threading.Thread(target=lambda: answers.append(commands.press(name, value)))
+        thread = threading.Thread(target=lambda: answers.append(commands.press(name, level(value))))
         thread.start()
         return thread
 

@@ -18,6 +18,7 @@ import numpy as np
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
+from std_msgs.msg import UInt64
 from trajectory_msgs.msg import JointTrajectory
 
 from ir_msgs.msg import (
@@ -61,6 +62,7 @@ _TOPICS: dict[str, tuple[Any, QoSProfile]] = {
     names.CONTROLLER_STATE: (ControllerState, _NEWEST),
     names.PLC_INPUTS_IN_FORCE: (PlcInputs, _LATCHED),
     names.PLC_OUTPUTS: (PlcOutputs, _LATCHED),
+    names.STOP_NUMBER: (UInt64, _LATCHED),
     names.CARRIED_LOAD: (CarriedLoad, _LATCHED),
     names.MACHINE_STATES: (MachineStates, _LATCHED),
     names.CELL: (CellState, _LATCHED),
@@ -113,6 +115,7 @@ class LiveNode(Node):
             (names.CONTROLLER_STATE, self._controller),
             (names.PLC_INPUTS_IN_FORCE, lambda m: {"in": levels(m[-1], plc.PlcInputs)}),
             (names.PLC_OUTPUTS, lambda m: {"out": levels(m[-1], plc.PlcOutputs)}),
+            (names.STOP_NUMBER, lambda m: {"stop": str(m[-1].data)}),
             (names.CARRIED_LOAD, self._load),
             (names.MACHINE_STATES, self._machines),
             (names.CELL, self._cell),
@@ -255,7 +258,12 @@ class LiveNode(Node):
         if not self._set_bit.service_is_ready():
             command.answer(False, "no driver is heard")
             return
-        request = SetPlcInput.Request(name=command.name, value=command.value)
+        if not (command.after_stop or command.presses_the_stop):
+            command.answer(False, "the page has not heard of the driver's last stop: ask again")
+            return
+        request = SetPlcInput.Request(
+            name=command.name, value=command.value, after_stop=command.after_stop
+        )
         future = self._set_bit.call_async(request)
 
         def take(done: Any) -> None:

@@ -4,7 +4,9 @@ controls.
     GET /        the page, which holds nothing of the cell
     GET /scene   the cell as JSON (404 while it isn't known)
     GET /events  server-sent events: `start` with what is kept, then `records`
-    POST /press  {"name": "ab", "value": true}: a bit of the PLC, or what a hand did; with the token
+    POST /press  {"name": "ab", "value": {"level": true, "stop": "1795973304123000002"}}: a bit of
+                 the PLC, and the last stop that the page shows; of `ir view`, what a hand did; with
+                 the token
 
 It listens on 127.0.0.1 alone. Every connection has a thread that only reads what is kept, so a
 browser that is slow or dead costs its own connection and nothing else. Those that watch have places
@@ -111,6 +113,9 @@ def _page(parts_of: str, scripts: tuple[str, ...]) -> str:
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("view.html"))
 
 
+_NUMBER = re.compile(r"\d{0,19}\Z", re.ASCII)
+
+
 @dataclass(frozen=True)
 class Site:
     """A page and what its controls may ask for.
@@ -131,11 +136,20 @@ class Site:
         return _page(self.parts, self.scripts)
 
 
+def _is_level(value: object) -> bool:
+    """Whether it is a level, and the last stop that whoever asks for it has seen."""
+    if not isinstance(value, dict) or set(value) != {"level", "stop"}:
+        return False
+    level = value["level"]
+    stop = value["stop"]
+    return isinstance(level, bool) and isinstance(stop, str) and bool(_NUMBER.match(stop))
+
+
 LIVE = Site(
     "view_live.html",
     ("live_motion.js", "live.js"),
-    lambda value: isinstance(value, bool),
-    "true or false",
+    _is_level,
+    '{"level": true or false, "stop": TEXT, the number of the last stop that the page shows}',
     private=False,
 )
 """Of a cell whose nodes run: whoever is on this machine may watch; buttons need the token."""
@@ -429,10 +443,19 @@ _UNANSWERED = ButtonAnswer(False, f"the driver has not answered within {PATIENCE
 
 @dataclass(eq=False)
 class LevelCommand:
-    """A level asked for; `answer` lets the browser's thread go on, once."""
+    """A level asked for, and the last stop that who asks has seen, 0 for none; `answer` lets the
+    browser's thread go on, once.
+    """
 
     name: str
     value: bool
+    after_stop: int
+
+    @property
+    def presses_the_stop(self) -> bool:
+        """Whether it is the one that counts whatever its sender has seen."""
+        return self.name == _STOP and self.value
+
     _done: threading.Event = field(default_factory=threading.Event)
     _answer: ButtonAnswer = _UNANSWERED
 
@@ -459,14 +482,14 @@ class Commands:
         self._stops: queue.Queue[LevelCommand] = queue.Queue()
         self._order = threading.Lock()  # of presses and of what waits when they come
 
-    def press(self, name: str, value: bool) -> ButtonAnswer:
+    def press(self, name: str, value: Mapping[str, Any]) -> ButtonAnswer:
         """Asks and waits; refuses what is no bit, and what comes faster than it is answered."""
         if name not in BITS:
             return ButtonAnswer(
                 False, f"{name[:60]!r} is no bit of the PLC: known are {', '.join(BITS)}"
             )
-        command = LevelCommand(name, value)
-        stop = name == _STOP and value
+        command = LevelCommand(name, value["level"], int(value["stop"] or 0))
+        stop = command.presses_the_stop
         try:
             with self._order:
                 for before in _waiting(self._queue) if stop else ():

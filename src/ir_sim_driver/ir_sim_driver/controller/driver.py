@@ -26,7 +26,7 @@ from ir_sim_driver.controller.cell_scene import ContactScene, MachinesInScene, P
 from ir_sim_driver.controller.contacts import ContactWatch
 from ir_sim_driver.controller.goals import NO_GOAL, Goals, refused
 from ir_sim_driver.controller.outputs import Frame, FrameMaker, Joints, PartStatus, report
-from ir_sim_driver.controller.simulation import Simulation
+from ir_sim_driver.controller.simulation import Simulation, stale
 from ir_sim_driver.controller.surroundings import PlannedCell
 from ir_sim_driver.errors import BackendError, RequestRefusedError, TrajectoryRefusedError
 from ir_sim_driver.motion import (
@@ -312,19 +312,30 @@ class Driver:
     # -- requests; each raises RequestRefusedError, also while the controller is off the network --
 
     def press(
-        self, writer: str, name: str, level: bool, came_ns: int = 0, client: str = ""
+        self,
+        writer: str,
+        name: str,
+        level: bool,
+        came_ns: int = 0,
+        client: str = "",
+        after_stop: int = 0,
     ) -> tuple[PlcInputs, str]:
         """Set one bit, or the mode switch by the name of its position, or take one's own bit back.
 
         Returns the levels and a remark: why the bit will not count. A pressed emergency stop is
         latched in every mode, asleep too, and has been acted upon when this returns. came_ns: as of
         `recover`; only a press may come before the last stop. client: who it is among a writer's.
+        after_stop: the last stop that it knows, 0 where it doesn't say; another one refuses all but
+        a press.
         """
         pressed = name == STOP_BIT and level
         with self._access.online(asleep_too=pressed) as simulation:
             plc = simulation.plc
             if not pressed:
                 plc.stop.refuse_earlier(came_ns, name)
+                if after_stop not in (0, simulation.stop_number):
+                    refusal = stale(after_stop, simulation.stop_number)
+                    raise RequestRefusedError(StatusCode.INVALID_ROBOT_STATE, refusal)
             if name == END_REST or name in _TAKEN_BACK:
                 if level:
                     plc.check_owner(writer)

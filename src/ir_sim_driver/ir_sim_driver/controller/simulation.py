@@ -262,7 +262,7 @@ class Simulation:
         goal = vetted.goal
         refusal = self.refusal() or self.surroundings.refusal(goal, self.load)
         if not refusal and goal.after_stop is not None and goal.after_stop != self.stop_number:
-            refusal = _stale(goal.after_stop, self.stop_number)
+            refusal = stale(goal.after_stop, self.stop_number)
         if refusal := refusal or self.cell_watch.refusal(goal, vetted.keep.scene):
             raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, refusal)
         now = self.executor.motion()
@@ -496,8 +496,8 @@ def make_simulation(
     return Simulation(cell, data, robot, what, settings, plant)
 
 
-def _stale(known: int, number: int) -> str:
-    """Why a goal is refused whose sender knows another stop than the last one."""
+def stale(known: int, number: int) -> str:
+    """Why a goal or a bit is refused whose sender knows another stop than the last one."""
     news = "this driver was started after the one that the sender knows"
     if same_driver(known, number):
         news = (

@@ -38,7 +38,9 @@ class DriverServices:
 
         def work() -> str:
             value = bool(request.value)
-            levels, remark = self._driver.press(SERVICE, request.name, value, came_ns, client)
+            levels, remark = self._driver.press(
+                SERVICE, request.name, value, came_ns, client, int(request.after_stop)
+            )
             response.inputs = plc_inputs_to_msg(levels)
             if remark:
                 raise RequestRefusedError(StatusCode.INPUT_IGNORED, remark)

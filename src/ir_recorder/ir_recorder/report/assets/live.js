@@ -141,7 +141,7 @@ class LiveClearanceChart extends ClearanceChart {
     find("answer").textContent = `${said} = ${value ? 1 : 0} …`;
     try {
       const reply = await fetch("/press", { method: "POST", headers: { "Content-Type": "application/json", "X-Live-Token": token },
-        body: JSON.stringify({ name, value }) });
+        body: JSON.stringify({ name, value: { level: value, stop: (history.last || {}).stop || "" } }) });
       const words = reply.ok ? await reply.json() : { done: false, sentence: await reply.text() };
       find("answer").textContent = `${said} = ${value ? 1 : 0}: ${words.done ? "done" : "refused"}${words.sentence ? `, ${words.sentence}` : ""}`;
     } catch {
