@@ -10,9 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import coal
 import numpy as np
-from _coal_shapes import along_z, solid
+from _coal_shapes import CoalScene
 from _results import at_least, at_most
 from _truth_section import Asked, Found
 from scipy.spatial.transform import Rotation
@@ -46,17 +45,8 @@ class Judge:
         self._base = cell.base_pose
         self._pairs = scene.model.pairs
         bodies = [*cell.bodies(), *simulation.cell_watch.lying]
-        self._bodies = {body.name: (solid(body), _transform(body.pose)) for body in bodies}
+        self._coal = CoalScene(scene.capsules, bodies)
         self._balls = {body.name: _ball(body) for body in bodies}
-        self._capsules = {}
-        for c in scene.capsules:
-            length = float(np.linalg.norm(c.p1 - c.p0))
-            local = along_z(c.p0, c.p1) if length > 0.0 else np.eye(4)
-            if length == 0.0:
-                local[:3, 3] = c.p0
-            self._capsules[c.name] = c.link, coal.Capsule(c.radius, length), local
-        self._request = coal.DistanceRequest()
-        self._request.enable_signed_distance = True
 
     def least(self, q: FloatArray) -> tuple[float, set[str]]:
         """Least distance [m] at q (n,) of the pairs whose bounding balls meet, and its pair; inf:
@@ -64,7 +54,7 @@ class Judge:
         """
         poses = self._poses(q)
         near = [pair for pair in self._pairs if self._meet(pair[1], pair[2], poses)]
-        found = [(self._distance(*pair, poses), {pair[1], pair[2]}) for pair in near]
+        found = [(self._coal.distance(*pair, poses), {pair[1], pair[2]}) for pair in near]
         return min(found, key=lambda entry: entry[0], default=(np.inf, set()))
 
     def _meet(self, a: str, b: str, poses: list[FloatArray]) -> bool:
@@ -76,24 +66,16 @@ class Judge:
     def _ball(self, name: str, poses: list[FloatArray]) -> tuple[FloatArray, float]:
         if name in self._balls:
             return self._balls[name]
-        link, shape, local = self._capsules[name]
+        link, shape, local = self._coal.capsules[name]
         pose = poses[link]
         return pose[:3, :3] @ local[:3, 3] + pose[:3, 3], shape.radius + shape.halfLength
 
     def distance(self, bodies: set[str], q: FloatArray) -> float:
         """Distance [m] of one pair at q (n,)."""
         poses = self._poses(q)
-        return min(self._distance(*pair, poses) for pair in self._pairs if set(pair[1:]) == bodies)
-
-    def _distance(self, kind: str, a: str, b: str, poses: list[FloatArray]) -> float:
-        link, shape, local = self._capsules[a]
-        here = _transform(poses[link] @ local)
-        if kind == "SELF":
-            link, other, local = self._capsules[b]
-            there = _transform(poses[link] @ local)
-        else:
-            other, there = self._bodies[b]
-        return float(coal.distance(shape, here, other, there, self._request, coal.DistanceResult()))
+        return min(
+            self._coal.distance(*pair, poses) for pair in self._pairs if set(pair[1:]) == bodies
+        )
 
     def _poses(self, q: FloatArray) -> list[FloatArray]:
         poses = [self._base]
@@ -297,7 +279,3 @@ def _ball(body: Body) -> tuple[FloatArray, float]:
         return body.pose[:3, 3], np.inf
     low, high = body.bounds()
     return (low + high) / 2.0, float(np.linalg.norm(high - low)) / 2.0
-
-
-def _transform(pose: FloatArray) -> coal.Transform3s:
-    return coal.Transform3s(np.ascontiguousarray(pose[:3, :3]), np.ascontiguousarray(pose[:3, 3]))

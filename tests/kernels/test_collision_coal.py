@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from coal_scene import CoalScene
+from _coal_shapes import CoalScene
 from geometry_cases import CAPSULES, COLUMNS, KR210, OPEN, SELF_PAIRS, TCP, Body, every_kind, sample
 
 from ir_kernels import Chain, CollisionModel
@@ -16,7 +16,7 @@ AGREEMENT = 1e-6  # [m] both are exact; Coal iterates to this
 def test_distances_agree_with_coal_and_so_do_their_signs(bodies: tuple[Body, ...]) -> None:
     chain = Chain(KR210, tcp=TCP)
     model = CollisionModel(chain, CAPSULES, bodies, SELF_PAIRS)
-    theirs = CoalScene(bodies)
+    theirs = CoalScene(CAPSULES, bodies, gjk_tolerance=1e-9)
     q = sample(np.random.default_rng(7), 40)
     ours = model.distances(q)
     poses = chain.link_poses(q)
@@ -32,7 +32,7 @@ def test_distances_agree_with_coal_and_so_do_their_signs(bodies: tuple[Body, ...
 def test_the_nearest_pair_is_the_nearest_of_coal() -> None:
     chain = Chain(KR210, tcp=TCP)
     model = CollisionModel(chain, CAPSULES, COLUMNS, SELF_PAIRS)
-    theirs = CoalScene(COLUMNS)
+    theirs = CoalScene(CAPSULES, COLUMNS, gjk_tolerance=1e-9)
     q = sample(np.random.default_rng(8), 60)
     near = model.min_distance(q)
     for row in np.flatnonzero(near.distance > 0.0):

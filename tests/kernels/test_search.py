@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from coal_scene import CoalScene
+from _coal_shapes import CoalScene
 from geometry_cases import (
     CAPSULES,
     COLUMNS,
@@ -102,7 +102,7 @@ def test_a_path_joins_the_ends_exactly_and_every_step_is_proved(
 
 def test_coal_finds_nothing_too_near_on_a_path() -> None:
     collision = model(COLUMNS)
-    coal = CoalScene(COLUMNS)
+    coal = CoalScene(CAPSULES, COLUMNS, gjk_tolerance=1e-9)
     for seed in range(2):
         path = grown(collision, LEFT, RIGHT[None], seed).path
         share = np.linspace(0.0, 1.0, 8)[:, None, None]

@@ -5,8 +5,7 @@ found.
 import coal
 import numpy as np
 import pytest
-from _coal_shapes import along_z
-from coal_scene import transform
+from _coal_shapes import along_z, transform
 from geometry_cases import CAPSULES, KR210, shift
 
 from ir_kernels import COLLIDES, FREE, Chain

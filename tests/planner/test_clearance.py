@@ -19,8 +19,7 @@ from ir_values.arrays import FloatArray
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # the shapes of a scene in Coal
 
-import coal
-from _coal_shapes import along_z, solid
+from _coal_shapes import CoalScene
 
 SceneOf = Callable[[str], PlanningScene]
 COAL = 2e-6  # m: what Coal's iterations leave between it and the true distance
@@ -28,25 +27,10 @@ COAL = 2e-6  # m: what Coal's iterations leave between it and the true distance
 
 def coal_distance(scene: PlanningScene, q: FloatArray) -> float:
     """Smallest distance [m] over all pairs at q (n,), by Coal."""
-    bodies = {body.name: (solid(body), body.pose) for body in scene.cell.bodies()}
-    poses = scene.chain.link_poses(q[None])[0]
     capsules = [*scene.cell.robot.capsules, *(c for load in scene.loads for c in load.capsules)]
-    for c in capsules:
-        shape = coal.Capsule(c.radius, float(np.linalg.norm(np.subtract(c.p1, c.p0))))
-        bodies[c.name] = (shape, poses[c.link] @ along_z(np.array(c.p0), np.array(c.p1)))
-    request = coal.DistanceRequest()
-    request.enable_signed_distance = True
-    request.gjk_tolerance = 1e-9
-    smallest = np.inf
-    for pair in scene.collision.pairs:
-        a, pose_a = bodies[pair.body_a]
-        b, pose_b = bodies[pair.body_b]
-        first, second = (
-            coal.Transform3s(np.ascontiguousarray(p[:3, :3]), np.ascontiguousarray(p[:3, 3]))
-            for p in (pose_a, pose_b)
-        )
-        smallest = min(smallest, coal.distance(a, first, b, second, request, coal.DistanceResult()))
-    return float(smallest)
+    theirs = CoalScene(capsules, scene.cell.bodies(), gjk_tolerance=1e-9)
+    poses = scene.chain.link_poses(q[None])[0]
+    return min(theirs.distance(*pair, poses) for pair in scene.collision.pairs)
 
 
 def wandering(scene: PlanningScene, seed: int) -> JointTrajectory:
