@@ -5,6 +5,7 @@ with their signals alone: it drives them with delays of its own, and measures di
 from __future__ import annotations
 
 import heapq
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -20,6 +21,7 @@ from ir_planner.robots import RobotsPlan
 from ir_values.arrays import FloatArray
 
 RESOLUTION = 0.5e-3  # s: no two looks are nearer to each other
+_BERNSTEIN = np.array([[math.comb(j, i) / math.comb(4, i) for i in range(5)] for j in range(5)])
 _TOOL = (
     "{{name: {0}_tool, mass: 1.5, com: [0.06, 0, 0], inertia_box: [0.12, 0.1, 0.06], "
     "capsules: [{{name: {0}_body, p0: [0.03, 0, 0], p1: [0.1, 0, 0], radius: 0.04}}]}}"
@@ -143,12 +145,18 @@ class Judge:
         self._shapes: list[dict[str, list[tuple[int, Any, FloatArray]]]] = [{}, {}]
         self._request = coal.DistanceRequest()
         self._request.gjk_tolerance = 1e-9
-        # no point of an arm is faster than all joints at full speed with the whole arm as lever
-        self.speed = sum(_reach(cell) * float(cell.robot.velocity_max.sum()) for cell in cells)
+        self._levers = [_levers(cell) for cell in cells]
+        # no point of an arm is faster than all joints at full speed
+        limits = [cell.robot.velocity_max for cell in cells]
+        self.speed = sum(map(float, map(np.dot, self._levers, limits)))
+        self._speeds: dict[tuple[int, str], float] = {}
 
-    def least(self, pieces: list[list[Piece]], margin: float) -> tuple[float, float]:
+    def least(
+        self, pieces: list[list[Piece]], margin: float, *, first: bool = False
+    ) -> tuple[float, float]:
         """The least distance [m] and when it is [s]; between two looks nothing nearer than the
-        margin is missed unless it is over within the resolution.
+        margin is missed unless it is over within the resolution. first: the first one below the
+        margin is enough.
         """
         end = max(own[-1].begin + own[-1].step.duration for own in pieces)
         stands = [_begin(own) for own in pieces]
@@ -165,8 +173,36 @@ class Judge:
             loads = [own[at[k]].step.load for k, own in enumerate(pieces)]
             distance = self.distance((now[0], now[1]), (loads[0], loads[1]))
             best = min(best, (distance, time))
-            time += max((distance - margin) / self.speed, RESOLUTION)
+            if first and distance < margin:
+                return best
+            time += max(self._free(pieces, at, time, distance - margin), RESOLUTION)
         return best
+
+    def _free(
+        self, pieces: list[list[Piece]], at: Sequence[int], time: float, above: float
+    ) -> float:
+        """How long they can't come nearer by so much [s]: a robot that stands doesn't."""
+        now = [own[k] for own, k in zip(pieces, at, strict=True)]
+        speed = sum(self._speed(robot, piece) for robot, piece in enumerate(now))
+        later = [own[k + 1].begin for own, k in zip(pieces, at, strict=True) if k + 1 < len(own)]
+        until = min(later, default=np.inf) - time
+        return min(above / speed, until) if speed > 0.0 else until
+
+    def _speed(self, robot: int, piece: Piece) -> float:
+        """Speed [m/s] that no point of a robot exceeds in a piece: by the polynomials of its
+        joints, whose speeds are nowhere beyond their Bernstein coefficients.
+        """
+        trajectory = piece.step.trajectory
+        if trajectory is None or not piece.moving:
+            return 0.0
+        key = robot, trajectory.trajectory_id
+        if key not in self._speeds:
+            polynomials, seconds = trajectory.coefficients()
+            powers = np.arange(1, 6)
+            slopes = powers * polynomials[..., 1:] * seconds[:, None, None] ** (powers - 1)
+            bound = np.abs(slopes @ _BERNSTEIN.T).max(axis=-1)
+            self._speeds[key] = float((bound @ self._levers[robot]).max())
+        return self._speeds[key]
 
     def least_recorded(
         self, paths: Sequence[Path], margin: float, resolution: float = RESOLUTION
@@ -184,18 +220,29 @@ class Judge:
 
     def distance(self, q: tuple[FloatArray, FloatArray], loads: tuple[str, str]) -> float:
         """Of two arms at q with what they carry [m]."""
-        placed = []
-        for k in (0, 1):
-            links = self._chains[k].link_poses(np.ascontiguousarray(q[k][None]))[0]
-            own = [(s, links[link] @ local) for link, s, local in self._capsules(k, loads[k])]
-            placed.append(
-                [(s, coal.Transform3s(p[:3, :3].copy(), p[:3, 3].copy())) for s, p in own]
-            )
-        return min(
-            coal.distance(one, here, other, there, self._request, coal.DistanceResult())
-            for one, here in placed[0]
-            for other, there in placed[1]
+        placed = [self._placed(k, q[k], loads[k]) for k in (0, 1)]
+        centres = [np.array([pose[:3, 3] for _, pose in own]) for own in placed]
+        radii = [np.array([s.radius + s.halfLength for s, _ in own]) for own in placed]
+        apart = np.linalg.norm(centres[0][:, None] - centres[1][None], axis=-1)
+        below = apart - radii[0][:, None] - radii[1][None]  # by spheres around the capsules
+        best = np.inf
+        for index in below.argsort(axis=None):
+            a, b = divmod(int(index), below.shape[1])
+            if below[a, b] >= best:
+                break
+            best = min(best, self._between(placed[0][a], placed[1][b]))
+        return best
+
+    def _placed(self, robot: int, q: FloatArray, load: str) -> list[tuple[Any, FloatArray]]:
+        links = self._chains[robot].link_poses(np.ascontiguousarray(q[None]))[0]
+        return [(s, links[link] @ local) for link, s, local in self._capsules(robot, load)]
+
+    def _between(self, one: tuple[Any, FloatArray], other: tuple[Any, FloatArray]) -> float:
+        (a, here), (b, there) = (
+            (shape, coal.Transform3s(pose[:3, :3].copy(), pose[:3, 3].copy()))
+            for shape, pose in (one, other)
         )
+        return float(coal.distance(a, here, b, there, self._request, coal.DistanceResult()))
 
     def _capsules(self, robot: int, load: str) -> list[tuple[int, Any, FloatArray]]:
         known = self._shapes[robot]
@@ -220,9 +267,11 @@ def _at(point: FloatArray) -> FloatArray:
     return pose
 
 
-def _reach(cell: Cell) -> float:
+def _levers(cell: Cell) -> FloatArray:
+    """How far from each joint's axis no point of an arm is, with what it carries (n,) [m]."""
     lengths = [float(np.linalg.norm(origin[:3, 3])) for origin in cell.robot.joint_origin]
-    return sum(lengths) + float(np.linalg.norm(cell.tcp[:3, 3])) + 0.5
+    tip = float(np.linalg.norm(cell.tcp[:3, 3])) + 0.5
+    return np.array([sum(lengths[k + 1 :]) + tip for k in range(len(lengths))])
 
 
 def _begin(pieces: list[Piece]) -> FloatArray:

@@ -183,3 +183,31 @@ def test_parts_go_through_slots_in_turn_and_none_is_taken_too_soon(
             assert len(left) >= CYCLES * cycle.units
             last = left[-1] - left[-1 - cycle.units]
             assert last == pytest.approx(cycle.period, abs=ROUNDING * len(cycle.visits))
+
+
+@settings(max_examples=6, deadline=None)
+@given(
+    seed=st.integers(0, 10_000),
+    capacities=st.lists(st.integers(1, 2), min_size=MACHINES, max_size=MACHINES),
+    buffers=st.lists(st.integers(0, 1), min_size=MACHINES, max_size=MACHINES),
+    machine=st.integers(0, MACHINES - 1),
+)
+def test_with_room_slower_lines_and_faster_machines_are_never_dearer(
+    seed: int, capacities: list[int], buffers: list[int], machine: int
+) -> None:
+    problem = roomy(seed, capacities, buffers)
+    fastest = fastest_cycle(problem)
+    assert fastest is not None
+    sooner = replace(
+        problem,
+        process=tuple(s * (0.6 if k == machine else 1.0) for k, s in enumerate(problem.process)),
+    )
+    least = np.inf
+    for over in (1.001, 1.1, 1.5):
+        cycle = cheapest_cycle(problem, period=over * fastest.period)
+        quick = cheapest_cycle(sooner, period=over * fastest.period)
+        assert cycle is not None
+        assert quick is not None
+        assert cycle.joules <= least * (1.0 + 2e-6)  # each is within a millionth of the least
+        assert quick.joules <= cycle.joules * (1.0 + 2e-6)
+        least = cycle.joules

@@ -236,6 +236,20 @@ def test_a_faster_machine_never_makes_the_cycle_dearer(seed: int) -> None:
         assert cheapest(faster, period).joules <= before * (1.0 + EXACT)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_one_order_without_process_costs_its_movements_in_turn(seed: int) -> None:
+    """What a program of these movements costs in at most that time: the curves say it alone."""
+    problem = replace(drawn(seed, 1), process=(0.0,))
+    together = in_turn([*problem.activities, problem.hops[1, 0]])
+    assert shortest(problem) == pytest.approx(together.seconds[0])
+    for over in (1.0001, 1.1, 1.5, 3.0):
+        period = over * together.seconds[0]
+        corners = [s for s in together.seconds if s < period]
+        last = min(period, together.seconds[-1])
+        least = min(together.at(seconds) for seconds in (*corners, last))
+        assert cheapest(problem, period).joules == pytest.approx(least, rel=EXACT)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_two_units_are_never_dearer_than_one(seed: int) -> None:
     problem = drawn(seed, 2)
