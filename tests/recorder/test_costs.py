@@ -276,7 +276,8 @@ def test_both_ends_of_an_interval_are_rounded_alike(low: float, wide: float) -> 
 
 def test_zero_inside_an_interval_is_said_on_every_page(analysis: Analysis) -> None:
     (event,) = analysis.recording.savings[-1:]
-    savings = replace(event.savings, total_low=-1e6, total_high=1e6)
+    moved = replace(event.savings.movements, saved_low=-1e6, saved_high=1e6)
+    savings = replace(event.savings, movements=moved)
     events = (replace(event, savings=savings, time=0.0),)
     found = analyse(replace(analysis.recording, savings=events))
     member = member_of(found, "robot")

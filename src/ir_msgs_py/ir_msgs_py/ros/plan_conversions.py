@@ -280,8 +280,6 @@ def program_savings_from_msg(msg: ProgramSavingsMsg) -> ProgramSavings:
         available=msg.available,
         movements=saving_from_msg(msg.movements),
         pauses=saving_from_msg(msg.pauses),
-        total_low=msg.total.saved_low,
-        total_high=msg.total.saved_high,
         across=msg.across,
         around=msg.around,
         program_id=msg.program_id,

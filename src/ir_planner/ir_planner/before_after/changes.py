@@ -1,5 +1,7 @@
 """Changes from one program to another, movement by movement, with their intervals."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -84,6 +86,21 @@ class Costed:
         """What the drawn robots add (ROBOTS,) J to all of them."""
         return np.asarray(np.sum(self.added, axis=0))
 
+    @property
+    def pauses(self) -> int:
+        """How many of them are pauses."""
+        return sum(step.is_pause for step in self.steps)
+
+    def split(self, pauses: int) -> tuple[Costed, Costed]:
+        """All but the first so many pauses, and these."""
+        resting = [k for k, step in enumerate(self.steps) if step.is_pause][:pauses]
+        moving = [k for k in range(len(self.steps)) if k not in resting]
+        parts = [
+            Costed(tuple(self.steps[k] for k in own), tuple(self.added[k] for k in own))
+            for own in (moving, resting)
+        ]
+        return parts[0], parts[1]
+
 
 @dataclass(frozen=True, eq=False)
 class CostedHop(Costed):
@@ -108,6 +125,15 @@ class CostedHop(Costed):
 def costed(steps: Sequence[PlannedMovement], spreads: Spreads) -> Costed:
     """Steps with what the drawn robots add to each."""
     return Costed(tuple(steps), tuple(spreads.of(steps)))
+
+
+def saving_of(before: Costed, after: Costed) -> Saving:
+    """What a program saves of the energy of another one, by its movements and in its pauses, of
+    which both have as many; a wait at the end of one counts as movement.
+    """
+    pauses = min(program.pauses for program in (before, after))
+    (moving, resting), (moved, rested) = (program.split(pauses) for program in (before, after))
+    return saving(moving, moved).plus(saving(resting, rested))
 
 
 def saving(before: Costed, after: Costed) -> Saving:

@@ -12,7 +12,7 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.savings import BeforeAfter, Saving, Side
 from ir_msgs_py.status import StatusCode
-from ir_planner.before_after.changes import Costed, changes, costed, saving, side_of
+from ir_planner.before_after.changes import Costed, changes, costed, saving_of, side_of
 from ir_planner.before_after.today import Today, TodayMotion, nothing_moves
 from ir_planner.before_after.today_steps import (
     StepToday,
@@ -185,7 +185,7 @@ class _Asking:
             return Side(name, cycle_time, problem=plan.status.message)
         program = self.costed(plan.movements)
         self._found[name] = program
-        return side_of(name, cycle_time, program, self.request, saving(against, program))
+        return side_of(name, cycle_time, program, self.request, saving_of(against, program))
 
     def answer(
         self, name: str, kind: str, before: Costed, sides: list[Side], notes: Sequence[str]

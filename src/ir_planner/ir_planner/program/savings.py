@@ -148,13 +148,10 @@ def savings_of(
     resting = (_energy(standing), _energy(own))
     moved, rested = _spreads(common, planned, pauses, added)
     saved = interval(_saved(moving), moved), interval(_saved(resting), rested)
-    total = interval(_saved(moving) + _saved(resting), moved + rested)
     return ProgramSavings(
         available=True,
         movements=Saving(*moving, seconds, saved[0].low, saved[0].high),
         pauses=Saving(*resting, duration_of(standing), saved[1].low, saved[1].high),
-        total_low=total.low,
-        total_high=total.high,
         across=program.across,
         around=program.around,
     )

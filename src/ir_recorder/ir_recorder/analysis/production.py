@@ -256,13 +256,7 @@ def _of_a_cycle(savings: ProgramSavings | None, count: float) -> ProgramSavings 
         Saving(*(value / count for value in astuple(part)))
         for part in (savings.movements, savings.pauses)
     )
-    return replace(
-        savings,
-        movements=movements,
-        pauses=pauses,
-        total_low=savings.total_low / count,
-        total_high=savings.total_high / count,
-    )
+    return replace(savings, movements=movements, pauses=pauses)
 
 
 def _cycles_of_program(recording: Recording) -> int:
@@ -366,7 +360,7 @@ def _full_savings(
     savings: ProgramSavings | None, full: Unshortened | None
 ) -> ProgramSavings | None:
     """The savings with pauses at full length, predicted: the interval of the pauses is over the
-    robots that the planner's are over; that of the total adds the ends of its parts.
+    robots that the planner's are over.
     """
     if savings is None or full is None or not full.added:
         return savings
@@ -378,13 +372,7 @@ def _full_savings(
     )
     added = np.sum([pause.saved_added for pause in full.added], axis=0)
     low, high = interval_over(pauses.saved, np.asarray(added))
-    moved = savings.movements
-    return replace(
-        savings,
-        pauses=replace(pauses, saved_low=low, saved_high=high),
-        total_low=moved.saved_low + low,
-        total_high=moved.saved_high + high,
-    )
+    return replace(savings, pauses=replace(pauses, saved_low=low, saved_high=high))
 
 
 # Beside the cycle: the largest quarter of an hour, and rest while nobody works.

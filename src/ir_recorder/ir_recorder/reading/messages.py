@@ -55,7 +55,6 @@ def movement_from(message: Any) -> PlannedMovement:
 
 def savings_from(message: Any) -> ProgramSavings:
     """ProgramSavings of its decoded message."""
-    low, high = _interval(message.total)
     return ProgramSavings(
         available=bool(message.available),
         movements=_saving_from(message.movements),
@@ -64,19 +63,12 @@ def savings_from(message: Any) -> ProgramSavings:
         around=int(message.around),
         program_id=message.program_id,
         sentence=message.sentence,
-        total_low=low,
-        total_high=high,
     )
 
 
 def _saving_from(message: Any) -> Saving:
-    low, high = _interval(message)
-    return Saving(float(message.common), float(message.planned), float(message.seconds), low, high)
-
-
-def _interval(message: Any) -> tuple[float, float]:
-    """Of a saving; recordings of before intervals have none."""
-    return float(getattr(message, "saved_low", 0.0)), float(getattr(message, "saved_high", 0.0))
+    low, high = (getattr(message, name, 0.0) for name in ("saved_low", "saved_high"))  # older: none
+    return Saving(*map(float, (message.common, message.planned, message.seconds, low, high)))
 
 
 def report_from(message: Any) -> TrajectoryReport:
