@@ -86,10 +86,7 @@ def drawn_saving(rng: np.random.Generator) -> Saving:
 def drawn_savings(rng: np.random.Generator) -> ProgramSavings:
     movements = drawn_saving(rng)
     pauses = drawn_saving(rng)
-    low, high = (
-        getattr(movements, end) + getattr(pauses, end) for end in ("saved_low", "saved_high")
-    )
-    return ProgramSavings(True, movements, pauses, 1, 0, "id", "words", low, high)
+    return ProgramSavings(True, movements, pauses, 1, 0, "id", "words")
 
 
 def lacking(recording: Recording, missing: frozenset[int], events: int) -> Recording:

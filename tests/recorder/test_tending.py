@@ -10,7 +10,14 @@ from hypothesis import strategies as st
 
 from ir_description import Cell, cell_from_yaml, cell_to_yaml, load_cell
 from ir_msgs_py.report import PlannedMovement, TrajectoryReport
-from ir_recorder.analysis.tending import SignalChange, TendedStep, Tending, tending_of
+from ir_recorder.analysis.tending import (
+    SHORT,
+    SignalChange,
+    TendedStep,
+    Tending,
+    planned_machines,
+    tending_of,
+)
 
 SIGNALS = """
 signals:
@@ -25,6 +32,7 @@ def tended_cell() -> Cell:
 
 
 CELL = tended_cell()
+GAUGE = next(each for each in CELL.equipment if each.name == "gauge")
 
 
 def step(seconds: float, **more: object) -> PlannedMovement:
@@ -104,3 +112,31 @@ def test_a_cell_without_a_route_has_no_parts() -> None:
 
 def test_a_run_of_which_no_part_left_has_no_parts() -> None:
     assert tending_of(CELL, [TendedStep(step(1.0), 0.0, 0.0, 1.0, 0.0, 1.0)], []) is None
+
+
+@given(process=st.floats(1.0, 100.0), wait=st.floats(0.0, 20.0), round_=st.integers(0, 2))
+def test_a_planned_cycle_has_each_machine_at_work_once(
+    process: float, wait: float, round_: int
+) -> None:
+    """From where the robot puts a part down until its process is over, then until it takes it,
+    wherever in the cycle that begins.
+    """
+    kinds = [
+        planned(2.0, "gauge_seat", "gripper"),
+        planned(process + wait, "gauge_seat.front", "gripper"),
+        planned(3.0, "gauge_seat", "gripper+gear"),
+        planned(4.0, "outfeed_place", "gripper"),
+        planned(1.0, "infeed_pick", "gripper+gear"),
+    ]
+    steps = [*kinds[round_:], *kinds[:round_]]
+    period = sum(each.duration for each in steps)
+    (gauge,) = planned_machines(CELL, steps)
+    assert gauge.name == "gauge"
+    worked = sum(span.within(0.0, period) for span in gauge.working)
+    waited = sum(span.within(0.0, period) for span in gauge.finished)
+    assert worked == pytest.approx(GAUGE.process)
+    assert waited == pytest.approx((process + wait - GAUGE.process) % period, abs=2.0 * SHORT)
+
+
+def planned(seconds: float, station: str, load: str) -> PlannedMovement:
+    return step(seconds, to_station=station, load=load)

@@ -79,11 +79,8 @@ def add_plan(plan: argparse.ArgumentParser) -> None:
     words = "of several robots: all together never need more; 0: no limit (0)"
     plan.add_argument("--peak-power", type=float, default=0.0, metavar="KW", help=words)
     add_start(plan)
-    plan.add_argument(
-        "--saving",
-        action="store_true",
-        help="hold it against a common program in equal time as well",
-    )
+    words = "hold it against a common program in equal time as well, as every -o .mcap and .html is"
+    plan.add_argument("--saving", action="store_true", help=words)
     words = (
         "also write the plan, repeatable: .mcap a recording for ir report and ir ros replan, .html "
         "its report, also where it failed (needs ROS's Python packages)"
@@ -115,6 +112,8 @@ def run_plan(arguments: argparse.Namespace) -> int:
         return run_robots(arguments, several)
     if arguments.peak_power:
         raise InputError("--peak-power needs a CELL with several robots, such as two_robots")
+    # a year counts as many cycles as the common program makes
+    arguments.saving |= any(each.suffix in (".html", ".mcap") for each in arguments.output)
     if arguments.parts_per_hour is not None:
         return run_steady(arguments, lambda *what: _report(arguments, *what))
     _check_steady_options(arguments)

@@ -55,7 +55,8 @@ class Saving:
 class ProgramSavings:
     """Savings of the program `program_id`; `around` of the `across` regional movements of the
     common program run around bodies. sentence: all figures with their baselines, or why there are
-    none (not available).
+    none (not available). common_seconds [s]: what the common program takes where that is longer
+    than what both are counted in; 0 elsewhere.
     """
 
     available: bool = False
@@ -65,6 +66,7 @@ class ProgramSavings:
     around: int = 0
     program_id: str = ""
     sentence: str = ""
+    common_seconds: float = 0.0
 
     @property
     def total(self) -> Saving:
@@ -108,9 +110,9 @@ class Side:
 
     movements, report, hops: empty where `problem` says why there is none. time (N,) s, watts (N,):
     power at the mains, means over even steps; high (N,): the largest of each step, without it the
-    means. saving: of today's energy; where the line needs more
-    time than today's program takes, of today's that waits at its end. peak: ends of the 90 %
-    interval of its peak power [W].
+    means. moving, resting: what its movements and its pauses save of today's energy; where the line
+    needs more time than today's program takes, of today's that waits at its end. peak: ends of the
+    90 % interval of its peak power [W].
     """
 
     name: str
@@ -121,7 +123,8 @@ class Side:
     time: FloatArray = field(default_factory=lambda: np.zeros(0))
     watts: FloatArray = field(default_factory=lambda: np.zeros(0))
     high: FloatArray = field(default_factory=lambda: np.zeros(0))
-    saving: Saving = field(default_factory=Saving)
+    moving: Saving = field(default_factory=Saving)
+    resting: Saving = field(default_factory=Saving)
     problem: str = ""
     peak: tuple[float, float] = (0.0, 0.0)
 
@@ -130,6 +133,11 @@ class Side:
             set_field(self, "high", self.watts)
         for name in ("time", "watts", "high"):
             set_field(self, name, read_only(getattr(self, name), name, (None,)))
+
+    @property
+    def saving(self) -> Saving:
+        """What it saves in all."""
+        return self.moving.plus(self.resting)
 
     @property
     def found(self) -> bool:

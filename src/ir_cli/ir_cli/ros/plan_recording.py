@@ -64,6 +64,8 @@ def write_plan(
     facts = {contents.PLAN: "never driven"}
     if doors := assumed_doors(cell):
         facts[_DOORS] = doors[0].removeprefix(_DOORS_ARE)
+    if plan.savings.common_seconds > 0.0:
+        facts[contents.COMMON_SECONDS] = f"{plan.savings.common_seconds!r} s"
     session = RecordingSession(writer, facts, now)
     urdf = robot_urdf(cell.robot, cell.tool, cell.tcp, cell.base_pose)
     session.attach_cell(CellFiles(cell_to_yaml(cell), urdf), now)

@@ -127,13 +127,13 @@ def costed(steps: Sequence[PlannedMovement], spreads: Spreads) -> Costed:
     return Costed(tuple(steps), tuple(spreads.of(steps)))
 
 
-def saving_of(before: Costed, after: Costed) -> Saving:
-    """What a program saves of the energy of another one, by its movements and in its pauses, of
+def savings(before: Costed, after: Costed) -> tuple[Saving, Saving]:
+    """What a program saves of the energy of another one by its movements, and in its pauses, of
     which both have as many; a wait at the end of one counts as movement.
     """
     pauses = min(program.pauses for program in (before, after))
     (moving, resting), (moved, rested) = (program.split(pauses) for program in (before, after))
-    return saving(moving, moved).plus(saving(resting, rested))
+    return saving(moving, moved), saving(resting, rested)
 
 
 def saving(before: Costed, after: Costed) -> Saving:
@@ -143,9 +143,9 @@ def saving(before: Costed, after: Costed) -> Saving:
 
 
 def side_of(
-    name: str, cycle_time: float, program: Costed, request: ProgramRequest, saved: Saving
+    name: str, cycle_time: float, program: Costed, request: ProgramRequest, against: Costed
 ) -> Side:
-    """A side with the intervals of its energies and its power over time."""
+    """A side with the intervals of its energies, its power over time and what it saves."""
     parameters = request.settings.drives(request.cell.robot).parameters
     steps = tuple(
         replace(step, report=replace(step.report, energy_low=within.low, energy_high=within.high))
@@ -159,10 +159,11 @@ def side_of(
     if parameters is not None:
         report = replace(report, power_parameters=parameters.name)
     time, watts, high = _power(steps, request)
+    saved = savings(against, program)
     hops = tuple(_hop(hop) for hop in hops_of(program))
     peak = peak_interval(steps, request)
     within = (peak.low, peak.high)
-    return Side(name, cycle_time, steps, report, hops, time, watts, high, saved, "", within)
+    return Side(name, cycle_time, steps, report, hops, time, watts, high, *saved, "", within)
 
 
 def hops_of(program: Costed) -> list[CostedHop]:
@@ -289,8 +290,9 @@ def _paused(before: CostedHop, after: CostedHop) -> tuple[int, str]:
     shown = [mode.replace(">", ", then ").replace("_", " ").lower() for mode in modes]
     if modes[0] == modes[1]:
         return TIMES, f"{after.seconds:.2f} s instead of {before.seconds:.2f} s"
-    today = shown[0] or "the controller's own timer, which only closes the brakes"
-    return MODE, f"{shown[1] or 'stand on motors'} instead of {today}"
+    today, then = (f"{hop.joules / hop.seconds:.0f} W on average" for hop in (before, after))
+    own = shown[0] or "the controller's own timer, which only closes the brakes"
+    return MODE, f"{shown[1] or 'stand on motors'} ({then}) instead of {own} ({today})"
 
 
 def _moved(before: CostedHop, after: CostedHop) -> tuple[int, str]:

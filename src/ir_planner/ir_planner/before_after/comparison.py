@@ -10,9 +10,9 @@ from ir_msgs_py.announcements import MachineState
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
-from ir_msgs_py.savings import BeforeAfter, Saving, Side
+from ir_msgs_py.savings import BeforeAfter, Side
 from ir_msgs_py.status import StatusCode
-from ir_planner.before_after.changes import Costed, changes, costed, saving_of, side_of
+from ir_planner.before_after.changes import Costed, changes, costed, side_of
 from ir_planner.before_after.today import Today, TodayMotion, nothing_moves
 from ir_planner.before_after.today_steps import (
     StepToday,
@@ -185,7 +185,7 @@ class _Asking:
             return Side(name, cycle_time, problem=plan.status.message)
         program = self.costed(plan.movements)
         self._found[name] = program
-        return side_of(name, cycle_time, program, self.request, saving_of(against, program))
+        return side_of(name, cycle_time, program, self.request, against)
 
     def answer(
         self, name: str, kind: str, before: Costed, sides: list[Side], notes: Sequence[str]
@@ -197,9 +197,7 @@ class _Asking:
                 StatusCode.PLANNING_FAILED, "; ".join(dict.fromkeys(s.problem for s in sides))
             )
         made = changes(before, self._found[towards])
-        today = side_of(
-            TODAY, 0.0, before, self.request, Saving(before.joules, before.joules, before.seconds)
-        )
+        today = side_of(TODAY, 0.0, before, self.request, before)
         notes = (*notes, *_violations(today))
         return BeforeAfter(name, kind, today, tuple(sides), towards, made, notes)
 

@@ -295,7 +295,13 @@ def _with_program(
         with journal.stage("saving"):
             held = made.saving(Spreads(made.request))
             own = program_of(made.steps)
-            said = replace(held.parts, program_id=own.program_id, sentence=held.sentence)
+            longer = held.common_period if held.common_period > held.period else 0.0
+            said = replace(
+                held.parts,
+                program_id=own.program_id,
+                sentence=held.sentence,
+                common_seconds=longer,
+            )
             plan = replace(plan, saving=held, program=replace(own, savings=said))
     if cycles:
         with journal.stage("run"):

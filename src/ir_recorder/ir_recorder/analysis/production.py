@@ -77,6 +77,11 @@ class Amount:
         """
         return OPEN if self.low < self.high and self.low <= 0.0 <= self.high else ""
 
+    @staticmethod
+    def of_value(value: float) -> Amount:
+        """One without an interval."""
+        return Amount(value, value, value)
+
     def gain(self) -> tuple[str, Amount]:
         """A saving as people say it: "saved", or "more" where it is negative, and how much."""
         if self.value >= 0.0:
@@ -473,7 +478,7 @@ def saved_at_rest(cell: Cell, load: str, data: PowerData) -> Amount:
     rests = home_watts(cell, load, data)
     saved = rests[BRAKES] - rests[HIBERNATION]
     if all_rests_measured(data):
-        return Amount(saved, saved, saved)
+        return Amount.of_value(saved)
     robots = Predictor(cell.robot, data.dc_link, cell.base_pose, data_sheet_of(cell.robot, data))
     brakes, deepest = (
         robots.added_at_rest(mode, cell.machine_home, carried(cell, load))

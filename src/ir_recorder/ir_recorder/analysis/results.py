@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from ir_recorder.analysis.loads import LoadTimeline
 from ir_recorder.analysis.resting_power import Plateau
 from ir_recorder.analysis.steps import ExecutedStep
 from ir_recorder.analysis.tending import Tending
+from ir_recorder.format import contents
 from ir_recorder.reading.recording import JointSeries, PowerSeries, Recording
 from ir_values.arrays import FloatArray
 
@@ -254,7 +256,10 @@ class Analysis:
         """
         begin = self.steps[0].step.start if self.steps else math.inf
         known = [event.savings for event in self.recording.savings if event.time <= begin]
-        return known[-1] if known and known[-1].available else None
+        if not known or not known[-1].available:
+            return None
+        longer = re.fullmatch(r"(\d+\.\d+) s", self.recording.fact(contents.COMMON_SECONDS))
+        return replace(known[-1], common_seconds=float(longer[1])) if longer else known[-1]
 
     @property
     def movements(self) -> tuple[StepResult, ...]:

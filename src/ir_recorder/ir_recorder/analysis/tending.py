@@ -225,3 +225,54 @@ def _filling(rows: Sequence[PartRow], machines: Sequence[MachineTimes]) -> int:
     begins = [machine.working[0].begin for machine in machines if machine.working]
     latest = max(begins, default=0.0)
     return sum(row.span.begin < latest for row in rows)
+
+
+# A plan of a cycle that is repeated, which nobody drove.
+
+
+def planned_machines(cell: Cell, steps: Sequence[PlannedMovement]) -> tuple[MachineTimes, ...]:
+    """When the machines of a route work in the cycle of a plan, and when a finished part lies in
+    them: from where the robot puts one down until it takes one, the cycle repeated before and
+    after.
+    """
+    if cell.route is None or not steps:
+        return ()
+    ends = np.cumsum([step.duration for step in steps])
+    period = float(ends[-1])
+    put: dict[str, list[float]] = {}
+    taken: dict[str, list[float]] = {}
+    for before, step, end in zip([steps[-1], *steps[:-1]], steps, ends.tolist(), strict=True):
+        if step.to_station in cell.route.visits and _carries(before) != _carries(step):
+            times, at = (taken, end - step.duration) if _carries(step) else (put, end)
+            times.setdefault(cell.station(step.to_station).equipment, []).append(at)
+    machines = [each for each in cell.equipment if each.process > 0.0 and each.name in put]
+    return tuple(
+        _repeated(machine.name, machine.process, put[machine.name], taken[machine.name], period)
+        for machine in machines
+        if machine.name in taken
+    )
+
+
+def _carries(step: PlannedMovement) -> bool:
+    """Whether the robot holds a part."""
+    return "+" in step.load
+
+
+def _repeated(
+    name: str, process: float, put: Sequence[float], taken: Sequence[float], period: float
+) -> MachineTimes:
+    working = []
+    finished = []
+    for begin in put:
+        done = begin + process
+        later = [time + k * period for time in taken for k in range(_CYCLES)]
+        until = min((time for time in later if time >= done - SHORT), default=done)
+        for k in range(-_CYCLES, 1):
+            shift = k * period
+            working.append(Span(begin + shift, done + shift))
+            if until > done:
+                finished.append(Span(done + shift, until + shift))
+    return MachineTimes(name, tuple(working), tuple(finished))
+
+
+_CYCLES = 4  # of a part in a machine, at most

@@ -44,6 +44,7 @@ SAFETY_DISTANCE: Final = "safety_distance"  # S_m [m] that movements are planned
 PLAN: Final = "plan"  # "never driven": a plan, found or not, without a robot
 # full lengths of the pauses in power modes: "180 s, 1800 s"
 UNSHORTENED_PAUSES: Final = "unshortened_pauses"
+COMMON_SECONDS: Final = "common_program"  # what it takes where that is longer: "115.34 s"
 CYCLES: Final = "cycles"  # how many whole cycles the program of each robot is made of: "3"
 
 

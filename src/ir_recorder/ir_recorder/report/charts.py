@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 from ir_msgs_py.savings import ProgramPoint
 from ir_recorder.analysis import Analysis
-from ir_recorder.analysis.production import PREDICTED, production_of
-from ir_recorder.report.bars import TICKS, Piece, Row, bars, tick_step
-from ir_recorder.report.number_text import joules, kilowatt_hours, seconds, span_of, text
+from ir_recorder.report.bars import TICKS, tick_step
+from ir_recorder.report.number_text import joules, kilowatt_hours, seconds, text
 
 _ALONG = 2.5  # labels of cycle times, about: they are wide
 # How named curves and points of one drawing differ: by a colour, a mark, and beyond seven by a
@@ -73,16 +72,13 @@ _ENERGIES: dict[Callable[[float], str], _Units] = {
 @dataclass(frozen=True)
 class Point:
     """A program: cycle time [s], energy [J] at the mains, and whether that is simulated or
-    predicted; the ends of its 90 % interval [J], nan where it has none. style: of its bar.
+    predicted.
     """
 
     name: str
     seconds: float
     energy: float
     source: str
-    low: float = math.nan
-    high: float = math.nan
-    style: str = "planned"
 
 
 def front_section(analysis: Analysis, planned: Sequence[ProgramPoint] = ()) -> str:
@@ -97,43 +93,26 @@ def front_section(analysis: Analysis, planned: Sequence[ProgramPoint] = ()) -> s
     run = program.whole if program is not None and math.isfinite(program.whole.energy) else None
     points = [
         *(
-            [Point("this run", run.seconds, run.energy, analysis.recording.origin, style="driven")]
+            [Point("this run", run.seconds, run.energy, analysis.recording.origin)]
             if run is not None
             else ()
         ),
         *(Point("", point.cycle_time, point.energy, "predicted") for point in planned),
     ]
     if total is not None:
-        common = Point("common program", total.seconds, total.common, "predicted", style="today")
-        ends = _planned_ends(analysis, total.planned)
-        named = "planned in its time"
-        planned_then = Point(
-            named, total.seconds, total.planned, "predicted", *ends, style="planned"
-        )
-        points += [common, planned_then]
+        points += [
+            Point("common program", total.seconds, total.common, "predicted"),
+            Point("planned in its time", total.seconds, total.planned, "predicted"),
+        ]
     return front_part(points)
 
 
-def _planned_ends(analysis: Analysis, energy: float) -> tuple[float, float]:
-    """90 % interval of the plan in the common program's time, where it was not driven and has one;
-    NaN elsewhere.
-    """
-    cycle = production_of(analysis)
-    if cycle is None or cycle.origin != PREDICTED or cycle.energy != energy:
-        return math.nan, math.nan
-    return (cycle.low, cycle.high) if cycle.low < cycle.high else (math.nan, math.nan)
-
-
 def front_part(points: Sequence[Point]) -> str:
-    """Section of the page: the drawing, or bars of energy where all programs take one time but for
-    a hundredth; "" for fewer than two points.
+    """Section of the page; "" for fewer than two points, and where all programs take one time but
+    for a hundredth.
     """
-    if len(points) < 2:
+    if len(points) < 2 or _one_time(points):
         return ""
-    if _one_time(points):
-        hint = "All take the same time but for a hundredth, so their energies are what differs."
-        head = f'<h2>Energy of a cycle</h2><p class="hint">{hint}</p>'
-        return f'<section id="front">{head}{_energy_bars(points)}</section>'
     joined = len(pareto(points)) > 1
     hint = "Left is faster, down is cheaper" + (
         "; the line joins programs that no other one beats in both." if joined else "."
@@ -145,22 +124,6 @@ def front_part(points: Sequence[Point]) -> str:
 def _one_time(points: Sequence[Point]) -> bool:
     times = [point.seconds for point in points]
     return max(times) - min(times) < _SAME_TIME * max(times)
-
-
-def _energy_bars(points: Sequence[Point]) -> str:
-    """A bar for each program, with the whisker of its interval."""
-    rows = []
-    for point in points:
-        name = point.name or "program of the front"
-        words = kilowatt_hours(point.energy)
-        notes = (f"{point.source}, in {seconds(point.seconds)}", _between(point))
-        piece = Piece(point.style, f"{name} {words}", point.energy)
-        rows.append(Row(name, (piece,), words, notes, whisker=(point.low, point.high)))
-    return bars(rows, "energy of a cycle")
-
-
-def _between(point: Point) -> str:
-    return span_of(point.low, point.high, kilowatt_hours) if point.low < point.high else ""
 
 
 def pareto(points: Sequence[Point]) -> list[Point]:

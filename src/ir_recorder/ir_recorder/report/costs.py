@@ -308,20 +308,17 @@ def costs_section(analysis: Analysis, costs: Costs) -> str:
     notes = "".join(f" {note[0].upper()}{note[1:]}." for note in cycle.notes)
     return (
         '<section id="costs"><h2>What a cycle costs</h2>'
+        f"{table(heads, rows, 'What a cycle costs')}"
         f'<p class="hint">{text(origin)}{_saving_is(cycle)}. A year has '
         f"{cycles_of_year(cycle.pace, costs)}{_waits(cycle)}.{text(notes)}"
-        f"{_bridge(analysis, cycle)} {counted_with(costs)}</p>"
-        f"{table(heads, rows, 'What a cycle costs')}</section>"
+        f"{_bridge(analysis, cycle)} {counted_with(costs)}</p></section>"
     )
 
 
 def _saving_is(cycle: Production) -> str:
     if cycle.savings is None:
         return ""
-    return (
-        "; the common program, the planned one and savings (the difference of both) are predicted, "
-        "with their 90 % interval"
-    )
+    return "; programs and savings are predicted. Small: 90 % intervals"
 
 
 def _waits(cycle: Production) -> str:
@@ -371,10 +368,12 @@ def _before(cycle: Production, costs: Costs, driven: bool) -> list[tuple[str, ..
         return []
     total = cycle.savings.total
     pace = total.seconds or cycle.seconds
-    rows = [("common program, predicted", total.common)]
+    alone = cycle.savings.common_seconds or pace
+    rows = [_cycle_row("common program, predicted", alone, total.common, pace, costs)]
     if driven:
-        rows.append(("planned program, predicted", total.planned))
-    return [_cycle_row(name, pace, energy, pace, costs) for name, energy in rows]
+        row = _cycle_row("planned program, predicted", pace, total.planned, pace, costs)
+        rows.append(row)
+    return rows
 
 
 def _row(cycle: Production, costs: Costs) -> tuple[str, ...]:
@@ -539,10 +538,9 @@ def counted_with(costs: Costs) -> str:
         f"{100.0 * costs.availability:g} % of them in cycles, "
         f"{origin if own else 'all assumed'}"
     )
-    rounded = "Each amount is rounded by itself, so sums may differ by one in the last digit."
     return (
         f'{text(words)}: <a href="#assumed">all values, and how to give yours</a>. '
-        f"{_stands(costs)}{rounded}"
+        f"{_stands(costs)}Each amount is rounded by itself."
     )
 
 
@@ -553,9 +551,8 @@ def _stands(costs: Costs) -> str:
         return ""
     part = 100.0 * hours / costs.production_hours
     return (
-        f"For {whole(hours)} h a year ({part:.3g} % of the shifts) the cell stands still within "
-        "its shifts: they are not counted, before or after, as nobody knows how long each stop "
-        "lasts. "
+        f"Not counted, before or after: the {whole(hours)} h a year ({part:.3g} % of the shifts) "
+        "in which the cell stands still within its shifts. "
     )
 
 
@@ -564,7 +561,8 @@ _SHORT = 0.5  # h a year: less is not said
 
 def assumed_section(costs: Costs) -> str:
     """All settings, those that no file gave named as assumed, in a sentence where all are; it is
-    unfolded on paper.
+    left out of
+    paper, where the sentence of `counted_with` stands.
     """
     own = set(NAMES) & set(costs.given)
     rows = [
@@ -580,7 +578,7 @@ def assumed_section(costs: Costs) -> str:
         for each in SETTINGS
     ]
     return (
-        '<details class="part printed"><summary><h2>What the money rests on</h2></summary>'
+        '<details class="part listed"><summary><h2>What the money rests on</h2></summary>'
         '<p class="hint" id="assumed">To change a value, write its name and your value as a line '
         f"of a file that begins with <code>format: {FORMAT}</code>, as <code>price: 0.31</code>, "
         "and give the file with <code>--costs costs.yaml</code>."
@@ -649,16 +647,9 @@ def clock_section(analysis: Analysis, costs: Costs) -> str:
     cycle = production_of(analysis)
     if cycle is None:
         return ""
-    saved = costs.saving_of_year(cycle)
-    idle = recorded_idle_saving(analysis, costs)
-    paid = "" if saved is None else payback(saved_year(saved, idle, costs).money, costs)
-    found = [
-        _demand(analysis, cycle, costs),
-        text(f"What is saved in shifts and outside of them {paid}.") if paid else "",
-    ]
     return (
-        f'<section id="around"><h2>Around the clock</h2><p class="hint">{" ".join(found).strip()}'
-        f"</p>{_idle(analysis, costs)}</section>"
+        '<section id="around"><h2>When nobody works</h2>'
+        f'{_idle(analysis, costs)}<p class="hint">{_demand(analysis, cycle, costs)}</p></section>'
     )
 
 
@@ -832,9 +823,8 @@ def _idle(analysis: Analysis, costs: Costs) -> str:
     ]
     heads = ("when nobody works", ">power", ">a year")
     return (
-        f'<p class="hint">{significant(costs.idle_hours, 6)} hours a year lie outside of the '
-        "shifts (nights, weekends, holidays): at machine home, by the data of controller and "
-        "tool. Left alone, the controller only closes the brakes. "
-        f"{text(idle_sentence(saving, costs))} {text(how_to_hibernate(analysis.cell))}</p>"
         f"{table(heads, rows, 'When nobody works', COMPACT)}"
+        f'<p class="hint">{significant(costs.idle_hours, 6)} hours a year lie outside of the '
+        f"shifts, at machine home. {text(idle_sentence(saving, costs))} "
+        f"{text(how_to_hibernate(analysis.cell))}</p>"
     )

@@ -64,7 +64,7 @@ from ir_recorder.report.number_text import (
     yearly_kilowatt_hours,
 )
 from ir_recorder.report.page import PAGE_START, folded
-from ir_recorder.report.paid import Paid, Tile, row_of
+from ir_recorder.report.paid import Paid, Tile, at_night, row_of, with_span
 from ir_recorder.report.shell import badge, shell
 from ir_recorder.report.step_table import TableValue, write_columns
 from ir_recorder.report.tables import COMPACT, bar, table
@@ -476,13 +476,13 @@ def _steps(paid: Paid, robots: Sequence[Robot], costs: Costs) -> list[str]:
     """What to do, what saves most first."""
     found: list[tuple[float, str]] = []
     if paid.idle is not None:
-        price = yearly_money(paid.idle.saved, costs.currency)
-        words = f"Let them go into {paid.idle.mode} at night and at weekends: {price} a year."
+        price = with_span(paid.idle.money, costs)
+        words = f"All together in {at_night(paid.idle)}: {price} a year."
         found.append((paid.idle.saved, words))
     if paid.saved is not None and paid.saved.value > 0.0 and not paid.saved.doubt:
-        saved = costs.money(paid.saved.value)
-        words = f"{_plans(robots)}: {yearly_money(saved, costs.currency)} a year."
-        found.append((saved, words))
+        saved = paid.saved.of(costs.money)
+        words = f"{_plans(robots)}: {with_span(saved, costs)} a year."
+        found.append((saved.value, words))
     return [words for _, words in sorted(found, reverse=True)] or ["Keep the programs as they are."]
 
 
@@ -544,7 +544,7 @@ def _tiles(
             demand_money(peak, costs),
         ),
     )
-    return [costs_tile, *paid.parts(costs), demand]
+    return [costs_tile, demand]
 
 
 def _outside(idle: IdleSaving | None, peak: float) -> str:
@@ -570,23 +570,14 @@ def _paid(members: Sequence[Member], costs: Costs) -> Paid:
     idle = _idle_saving(members, costs)
     robots = robots_of(members, costs)
     if saved is None:
-        return Paid(None, 0.0, idle, robots=len(robots))
+        return Paid(None, 0.0, idle)
     without = [robot for robot in robots if robot.saved is None]
     of = f", {counted(len(robots), 'robot')}"
     if without:
         of += f", {_names(without)} alike in all: no file says what its plan saves"
     unplanned = sum(robot.yearly.value for robot in without)
     recorded = (f"these files, {_as_made(members)}", sum_of([r.yearly for r in robots]).value)
-    return Paid(
-        saved,
-        common + unplanned,
-        idle,
-        of,
-        "common programs",
-        recorded,
-        robots=len(robots),
-        unplanned=unplanned,
-    )
+    return Paid(saved, common + unplanned, idle, of, "common programs", recorded)
 
 
 _ROBOT_HEADS = (

@@ -11,6 +11,7 @@ from ir_recorder.analysis import Analysis, Finding, ProgramTotals, Share, Verdic
 from ir_recorder.analysis.production import (
     DRIVES_ONLY,
     PREDICTED,
+    Amount,
     Production,
     demand_watts,
     driven_and_predicted,
@@ -20,6 +21,7 @@ from ir_recorder.analysis.production import (
     planned_interval,
     planned_share,
     production_of,
+    saved_amount,
 )
 from ir_recorder.format.contents import OWN_FACTS, VERSION
 from ir_recorder.reading.recording import Recording
@@ -174,7 +176,7 @@ def tiles(analysis: Analysis, costs: Costs | None = None) -> str:
     program = analysis.program
     prices = costs or Costs()
     cycle = production_of(analysis)
-    paid = [*_paid(analysis, prices).parts(prices)]
+    paid: list[Tile] = []
     if cycle is not None:
         paid += [yearly_tile(cycle, prices), _demand(analysis, cycle, prices)]
     if analysis.recording.only_planned and program is None:
@@ -220,7 +222,7 @@ def answer(analysis: Analysis, costs: Costs) -> str:
     total = cycle.savings.total
     count = costs.cycles_per_year(total.seconds or cycle.seconds)
     steps = [
-        (costs.money(saving.saved * count), words)
+        (saved_amount(saving).times(count).of(costs.money), words)
         for words, saving in (
             (MOVEMENTS, cycle.savings.movements),
             (PAUSES, cycle.savings.pauses),
@@ -238,7 +240,8 @@ def _without_saving(analysis: Analysis, cycle: Production, paid: Paid, costs: Co
     taken = f"{kilowatt_hours(energy.value)}, {kilograms(costs.co2(energy.value))} CO2"
     count = costs.cycles_per_year(cycle.pace)
     steps = [
-        (costs.money(lever.joules * count), f"{lever.name}, at most") for lever in levers(analysis)
+        (Amount.of_value(costs.money(lever.joules * count)), f"{lever.name}, at most")
+        for lever in levers(analysis)
     ]
     do = first_steps(steps, paid.idle, costs)
     if analysis.recording.only_planned:

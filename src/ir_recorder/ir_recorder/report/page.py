@@ -12,7 +12,6 @@ from ir_description import load_power_data
 from ir_msgs_py.savings import ProgramPoint
 from ir_recorder.analysis import Analysis, Finding, Tolerances
 from ir_recorder.analysis.indirect import agreement
-from ir_recorder.analysis.production import production_of
 from ir_recorder.report.bars import joule_bars
 from ir_recorder.report.charts import front_section
 from ir_recorder.report.costs import (
@@ -117,16 +116,15 @@ def report_html(
         "source": source(analysis),
         "verdict": verdict(checks, analysis),
         "failing": failing(checks),
-        "notes": notes(analysis),
         "paid": answer(analysis, prices),
         "tiles": tiles(analysis, prices),
         "run": run_tiles(analysis),
-        "costs": costs_section(analysis, prices),
+        "costs": folded(costs_section(analysis, prices), paper=True),
         "front": folded(front_section(analysis, front)),
         "levers": lever_section(analysis, prices),
         "assumed": assumed_section(prices),
-        "around": clock_section(analysis, prices),
-        "line": line_section(of_recording(analysis, prices), prices, _in_pauses(analysis)),
+        "around": folded(clock_section(analysis, prices)),
+        "line": folded(line_section(of_recording(analysis, prices), prices)),
         "engineers": _engineers(analysis, checks, joules(controller.dc_link_capacity_energy)),
         "unmoved": "" if _moves(analysis) else " hidden",
         "style": asset("page.css"),
@@ -143,14 +141,6 @@ def _subject(analysis: Analysis) -> str:
     if not analysis.recording.never_driven:
         return "the recorded run"
     return "what the plan costs" if analysis.savings is None else "what the plan saves"
-
-
-def _in_pauses(analysis: Analysis) -> float:
-    """The share of what the plan saves that it saves in pauses."""
-    cycle = production_of(analysis)
-    if cycle is None or cycle.savings is None or cycle.savings.total.saved <= 0.0:
-        return 0.0
-    return cycle.savings.pauses.saved / cycle.savings.total.saved
 
 
 def _moves(analysis: Analysis) -> bool:
@@ -186,7 +176,8 @@ def _engineers(analysis: Analysis, checks: Sequence[Finding], capacity: str) -> 
     if not only_proved(checks, analysis):
         parts.append(fold("Checks", "", check_table(checks), "checks", kept=True))
         parts.append(fold("Warnings in the log", "", warning_table(analysis), kept=True))
-    parts.append(fold("The file", "", fact_table(analysis)))
+    facts = notes(analysis) + fact_table(analysis)
+    parts.append(fold("The file, and the settings of its run", "", facts))
     return "\n".join(part for part in parts if part)
 
 
@@ -225,10 +216,12 @@ def fold(
     if not kept and "<table" not in body and 'class="row"' not in body:
         return ""
     own = f' id="{name}"' if name else ""
-    own += " open" if unfolded else ""
-    return (
-        f'<details class="part"{own}><summary><h2>{text(head)}</h2></summary>{hint}{body}</details>'
-    )
+    kind = "part"
+    if unfolded:
+        own += " open"
+        kind += " paper"
+    title = f"<summary><h2>{text(head)}</h2></summary>"
+    return f'<details class="{kind}"{own}>{title}{hint}{body}</details>'
 
 
 def folded(section: str, *, paper: bool = False) -> str:

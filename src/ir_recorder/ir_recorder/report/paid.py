@@ -4,7 +4,6 @@ it, what rest outside of the shifts saves, and both together.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,8 +21,7 @@ from ir_recorder.report.costs import (
     yearly_money,
     yearly_span,
 )
-from ir_recorder.report.number_text import kilowatt_hours, text
-from ir_recorder.report.whole_line import with_ends
+from ir_recorder.report.number_text import text, watts
 
 
 @dataclass(frozen=True)
@@ -54,8 +52,7 @@ class Paid:
     not known; idle: outside of the shifts. counted: what the year is
     made of, in words; before: what it is held against. driven: what else a year of it is called,
     and what that takes [J]: nothing is known of its nights, so they are as before. supply: what
-    limits the figures. robots: how many save it together. unplanned [J]: of `common`, what has no
-    plan, which is alike in all years.
+    limits the figures.
     """
 
     saved: Amount | None
@@ -65,8 +62,6 @@ class Paid:
     before: str = "today"
     driven: tuple[str, float] | None = None
     supply: str = ""
-    robots: int = 1
-    unplanned: float = 0.0
 
     def answer(
         self, costs: Costs, steps: Sequence[Step], part: tuple[float, float] | None = None
@@ -104,29 +99,25 @@ class Paid:
             said.append(f"What nights save is {self.idle.basis}.")
         return " ".join(each for each in said if each)
 
-    def parts(self, costs: Costs) -> list[Tile]:
-        """What is saved in shifts and outside of them, each by itself."""
-        return [tile for tile in (self._saved(costs), self._idle(costs)) if tile is not None]
-
     def picture(self, costs: Costs) -> str:
         """A year before and after; "" where the saving isn't known."""
         if self.saved is None:
             return ""
         nights = (0.0, 0.0) if self.idle is None else (self.idle.left_alone, self.idle.deepest)
         shifts = costs.money(self.common), costs.money(self.common - self.saved.value)
-        before = shifts[0] + nights[0]
-        saved = self.year(costs).money
-        ends = (before - saved.high, before - saved.low)
-        sure = f"90 % interval {yearly_span(*ends)} {costs.currency}" if ends[0] < ends[1] else ""
         rows = [
             _year_row(self.before, "today", (shifts[0], nights[0]), costs),
-            _year_row("as planned", "planned", (shifts[1], nights[1]), costs, ends, sure),
+            _year_row("as planned", "planned", (shifts[1], nights[1]), costs),
         ]
         if self.driven is not None:
             name, energy = self.driven
             rows.append(_year_row(name, "driven", (costs.money(energy), nights[0]), costs))
+        saved = self.year(costs).money
+        between = _between(saved, costs)
+        if saved.value > 0.0:
+            rows.append(self._saved_row(saved, between, costs))
         pale = " Pale: at night and at weekends." if self.idle is not None else ""
-        whisker = " Whisker: 90 % interval of the year as planned." if sure else ""
+        whisker = " Whisker: 90 % interval of what is saved." if between else ""
         common = _COMMON if self.before == COMMON else ""
         hint = f"In full colour: in shifts{self.counted}.{pale}{whisker}{common}"
         return (
@@ -134,63 +125,51 @@ class Paid:
             f'{bars(rows, "energy costs of a year")}<p class="hint">{text(hint)}</p></section>'
         )
 
+    def _saved_row(self, saved: Amount, between: str, costs: Costs) -> Row:
+        """What is saved of a year, with the whisker of its interval."""
+        name = "saved as planned"
+        nights = 0.0 if self.idle is None else self.idle.saved
+        pieces = (
+            Piece("saved", f"{name} in shifts", saved.value - nights),
+            Piece("saved night", f"{name} at night and at weekends", nights),
+        )
+        price = yearly_money(saved.value, costs.currency)
+        return Row(name, pieces, price, (between,), whisker=(saved.low, saved.high))
+
     def year(self, costs: Costs) -> SavedYear:
         """What is saved of a year in all; what isn't known counts as nothing."""
         return saved_year(self.saved or Amount(0.0, 0.0, 0.0), self.idle, costs)
 
-    def _saved(self, costs: Costs) -> Tile | None:
-        if self.saved is None:
-            return None
-        word, gain = self.saved.gain()
-        energy = kilowatt_hours(gain.value)
-        held = self.common - self.unplanned
-        share = with_ends(gain.times(100.0 / held)) if held > 0.0 else ""
-        less = "less" if word == "saved" else "more"
-        if self.unplanned > 0.0:
-            less += f" than {self.before} of the robots that have a plan"
-        notes = (
-            _between(gain.of(costs.money), costs),
-            f"{share} {less}, {energy}",
-            gain.doubt,
-            self.supply,
-            payback(self.year(costs).money, costs) if self.idle is None else "",
-        )
-        price = yearly_money(costs.money(gain.value), costs.currency)
-        return Tile(f"{word} a year in shifts, by the plan", price, notes)
 
-    def _idle(self, costs: Costs) -> Tile | None:
-        if self.idle is None:
-            return None
-        found = self.idle
-        between = _between(found.money, costs)
-        of = f", {self.robots} robots together" if self.robots > 1 else ""
-        return Tile(
-            "saved a year at night and at weekends",
-            yearly_money(found.saved, costs.currency),
-            (
-                between,
-                f"{found.mode} ({found.watts_deepest:.0f} W) instead of closed brakes "
-                f"({found.watts_left_alone:.0f} W){of}",
-                found.basis,
-            ),
-        )
-
-
-Step = tuple[float, str]
-"""Something to do: money of a year, and words."""
+Step = tuple[Amount, str]
+"""Something to do: what it saves a year in money, and words."""
 _FEW = 3  # to do, at the top of a page
 
 
 def first_steps(steps: Sequence[Step], idle: IdleSaving | None, costs: Costs) -> list[str]:
     """The steps that save most, and rest outside of the shifts among them."""
-    found = [step for step in steps if step[0] >= _WORTH]
+    found = [step for step in steps if step[0].value >= _WORTH]
     if idle is not None:
-        found.append((idle.saved, f"{idle.mode} at night and at weekends"))
-    found.sort(key=lambda step: -step[0])
+        found.append((idle.money, at_night(idle)))
+    found.sort(key=lambda step: -step[0].value)
     return [
-        f"{words[0].upper()}{words[1:]}: {yearly_money(money, costs.currency)} a year"
+        f"{words[0].upper()}{words[1:]}: {with_span(money, costs)} a year"
         for money, words in found[:_FEW]
     ]
+
+
+def at_night(idle: IdleSaving) -> str:
+    """What to do outside of the shifts, with the power before and after."""
+    return (
+        f"{idle.mode} ({watts(idle.watts_deepest)}) instead of closed brakes "
+        f"({watts(idle.watts_left_alone)}) at night and at weekends"
+    )
+
+
+def with_span(money: Amount, costs: Costs) -> str:
+    """An amount of a year, its 90 % interval in brackets."""
+    shown = yearly_money(money.value, costs.currency)
+    return f"{shown} ({yearly_span(money.low, money.high)})" if money.low < money.high else shown
 
 
 _WORTH = 0.01  # of a currency, a year: less is no step
@@ -214,8 +193,8 @@ def a_night(idle: IdleSaving | None, costs: Costs) -> list[str]:
     if idle is None:
         return []
     return [
-        f"A {name} of {hours:g} h: {_rest_of(hours, idle.deepest, idle, costs)} in {idle.mode} "
-        f"instead of {_rest_of(hours, idle.left_alone, idle, costs)} on brakes"
+        f"A {name} of {hours:g} h: {_rest_of(hours, idle.deepest, idle, costs)} instead of "
+        f"{_rest_of(hours, idle.left_alone, idle, costs)}"
         for name, hours in rests
     ]
 
@@ -233,8 +212,6 @@ def _year_row(
     style: str,
     money: tuple[float, float],
     costs: Costs,
-    whisker: tuple[float, float] = (math.nan, math.nan),
-    between: str = "",
 ) -> Row:
     """A bar of a year: money in shifts, and outside of them."""
     shifts, nights = (yearly_money(each, costs.currency) for each in money)
@@ -244,7 +221,7 @@ def _year_row(
         pieces.append(Piece(f"{style} night", f"at night and at weekends {nights}", money[1]))
         parts = f"{shifts} in shifts, {nights} outside"
     price = yearly_money(together(money), costs.currency)
-    return Row(name, tuple(pieces), price, (parts, between), whisker=whisker)
+    return Row(name, tuple(pieces), price, (parts,))
 
 
 def row_of(tiles: Sequence[Tile]) -> str:

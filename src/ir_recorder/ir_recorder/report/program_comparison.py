@@ -54,8 +54,8 @@ from ir_recorder.report.number_text import (
     watt_hours,
     watts,
 )
-from ir_recorder.report.page import PAGE_START, asset
-from ir_recorder.report.paid import MOVEMENTS, PAUSES, Paid, Tile, row_of
+from ir_recorder.report.page import PAGE_START, asset, folded
+from ir_recorder.report.paid import MOVEMENTS, PAUSES, Paid, Tile, at_night, row_of
 from ir_recorder.report.series import long_rests
 from ir_recorder.report.shell import badge
 from ir_recorder.report.step_table import TableValue, write_columns
@@ -116,26 +116,12 @@ def paid_row(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     year = year_of(found, side, costs)
     paid = _paid(found, cell, costs)
     steps = [
-        (costs.money(saved * year.cycles_a_year), words)
-        for words, saved in (
-            (MOVEMENTS, _saved_in(found, pauses=False)),
-            (PAUSES, _saved_in(found, pauses=True)),
-        )
+        (saved_amount(saving).times(year.cycles_a_year).of(costs.money), words)
+        for words, saving in ((MOVEMENTS, side.moving), (PAUSES, side.resting))
     ]
     each = 1.0 / costs.parts_per_cycle
     part = (side.saving.common * each, side.report.energy * each)
     return paid.answer(costs, steps, part).html() + paid.picture(costs)
-
-
-def _saved_in(found: BeforeAfter, *, pauses: bool) -> float:
-    """What the planned program saves [J] of a cycle in its pauses, or in all else."""
-    saved = sum(
-        sign * hop.energy
-        for sign, side in ((1.0, found.today), (-1.0, found.planned))
-        for hop in side.hops
-        if hop.is_pause
-    )
-    return saved if pauses else found.planned.saving.saved - saved
 
 
 def _paid(found: BeforeAfter, cell: Cell, costs: Costs) -> Paid:
@@ -158,7 +144,6 @@ def tiles(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     quarter = demand_of(side)
     return row_of(
         [
-            *_paid(found, cell, costs).parts(costs),
             Tile(
                 f"{word} a cycle",
                 kilowatt_hours(cycle.value),
@@ -292,10 +277,7 @@ def change_table(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     ]
     idle = _idle(found, cell, costs)
     if idle is not None:
-        words = (
-            f"{idle.mode} ({watts(idle.watts_deepest)}) instead of closed brakes "
-            f"({watts(idle.watts_left_alone)}), as the controller does by itself"
-        )
+        words = f"{at_night(idle)}, as the controller does by itself"
         where = f"at night and at weekends<small>{WORK[MODE]}, {idle.basis}</small>"
         priced.insert(0, (idle.money, (where, text(words), DASH)))
     most = max((price.value for price, _ in priced), default=0.0)
@@ -401,7 +383,7 @@ def basis_section(found: BeforeAfter, cell: Cell) -> str:
     )
     items = "".join(f"<li>{text(one)}</li>" for one in said)
     return (
-        '<details class="part printed"><summary><h2>What the figures rest on</h2>'
+        '<details class="part listed paper"><summary><h2>What the figures rest on</h2>'
         f'</summary><ul id="basis">{items}</ul></details>'
     )
 
@@ -574,9 +556,7 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
 def _line(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     if not cell.robot.controller.counted:
         return ""
-    saved = found.planned.saving.saved
-    share = _saved_in(found, pauses=True) / saved if saved > 0.0 else 0.0
-    return line_section(of_saving(found.planned.saving, costs), costs, share)
+    return folded(line_section(of_saving(found.planned.saving, costs), costs))
 
 
 def _problems(found: BeforeAfter, cell: Cell) -> str:
@@ -596,9 +576,7 @@ def _points(sides: Sequence[Side]) -> list[Point]:
     points: list[Point] = []
     for side in sides:
         report = side.report
-        ends = report.energy_low, report.energy_high
-        style = "planned" if points else "today"
-        points.append(Point(side.name, report.duration, report.energy, "predicted", *ends, style))
+        points.append(Point(side.name, report.duration, report.energy, "predicted"))
     return points
 
 

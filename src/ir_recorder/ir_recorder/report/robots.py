@@ -29,6 +29,7 @@ from ir_recorder.report.costs import (
     Costs,
     IdleSaving,
     assumed_section,
+    counted_with,
     idle_saving,
     money_of_thousand,
     yearly_money,
@@ -227,6 +228,7 @@ def _table(analyses: Mapping[str, Analysis], cycle: Production | None, costs: Co
         "others. Energy, prediction and time are of the whole run, each robot until its own end; "
         "the peaks of robots come at different times."
     )
+    hint = f"{hint} {counted_with(costs)}"
     return f'{table(heads, rows, "Robots")}<p class="hint">{hint}</p>'
 
 

@@ -91,7 +91,9 @@ def step_table(analysis: Analysis) -> str:
 
 
 def _planned_table(steps: Sequence[PlannedMovement]) -> str:
-    heads = ("#", "step", "load", ">time", ">predicted", ">clearance", "certificate")
+    heads = (
+        "#", "step", "load", ">time", ">predicted", ">mean power", ">clearance", "certificate"
+    )  # fmt: skip
     rows = (
         (
             str(place),
@@ -99,6 +101,7 @@ def _planned_table(steps: Sequence[PlannedMovement]) -> str:
             text(step.load or DASH),
             f"{step.duration:.2f} s",
             joules(step.report.energy) + _predicted(step.report),
+            watts(step.report.energy / step.duration) if step.duration > 0.0 else DASH,
             DASH if step.is_pause else millimetres(step.report.min_clearance),
             _certificate(step),
         )

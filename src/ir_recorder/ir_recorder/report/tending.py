@@ -4,27 +4,76 @@ modes, machines and power at the mains.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 
+import numpy as np
+
 from ir_recorder.analysis import Analysis
-from ir_recorder.analysis.tending import SHORT, PartRow, Span, Tending
+from ir_recorder.analysis.production import NO_MODE
+from ir_recorder.analysis.tending import (
+    SHORT,
+    MachineTimes,
+    PartRow,
+    Span,
+    Tending,
+    planned_machines,
+)
 from ir_recorder.reading.recording import PowerSeries
 from ir_recorder.report.gantt import Bar, Gantt, legend, mode_bars
-from ir_recorder.report.number_text import DASH, seconds, text, watt_hours
+from ir_recorder.report.number_text import DASH, mode_words, seconds, text, watt_hours
 from ir_recorder.report.tables import table
 
 _COUNTED = 1.0  # J
 
 
 def tending_section(analysis: Analysis) -> str:
-    """The section of a cell with a route of which parts were driven; "" for another."""
+    """The section of a cell with a route of which parts were driven, or a cycle was planned; ""
+    for another.
+    """
     tending = analysis.tending
     if tending is None:
-        return ""
+        return _planned(analysis)
     charts = "".join(_figure(part, tending, analysis.recording.power) for part in tending.parts)
     return (
         '<section id="tending"><h2>Parts: what each took, and who waited for whom</h2>'
         f"{_rest(analysis, tending)}{_parts(tending)}{legend(_KINDS)}{charts}</section>"
+    )
+
+
+def _planned(analysis: Analysis) -> str:
+    """The cycle of a plan that nobody drove."""
+    cell = analysis.cell
+    steps = analysis.recording.planned
+    if cell is None or cell.route is None or not analysis.recording.only_planned:
+        return ""
+    ends = np.cumsum([0.0, *(step.duration for step in steps)]).tolist()
+    spans = [Span(begin, end) for begin, end in itertools.pairwise(ends)]
+    robot: list[Bar] = []
+    modes: list[Bar] = []
+    for step, span in zip(steps, spans, strict=True):
+        if not (step.is_pause and step.power_mode):
+            style = "loaded" if "+" in step.load else "empty"
+            robot.append((style, span, f"{step.kind} {step.to_station}"))
+        mode = (step.power_mode or NO_MODE) if step.is_pause else "MOVING"
+        modes.append((f"m-{mode}", span, mode_words(mode)))
+    chart = Gantt(Span(0.0, ends[-1]))
+    chart.lane("robot", robot)
+    chart.lane("mode", modes)
+    for machine in planned_machines(cell, steps):
+        chart.lane(machine.name, _machine_bars(machine))
+    said = f"a cycle of {seconds(ends[-1])}"
+    savings = analysis.savings
+    if savings is not None and savings.common_seconds > 0.0:
+        more = 100.0 * (savings.common_seconds / ends[-1] - 1.0)
+        said += (
+            f"; the common program needs {seconds(savings.common_seconds)}: the plan makes "
+            f"{more:.1f} % more parts an hour"
+        )
+    return (
+        '<section id="tending"><h2>Who works and who waits</h2>'
+        f'{legend(_PLANNED)}<figure class="figure"><figcaption>{text(said)}</figcaption>'
+        f"{chart.drawn('cycle', said)}</figure></section>"
     )
 
 
@@ -70,11 +119,11 @@ def _waits(waits: Mapping[str, float]) -> str:
     return "<br>".join(said) or DASH
 
 
-_KINDS = {
+_PLANNED = {
     "loaded": "robot with a part, machine at work",
     "empty": "robot without, finished part that waits",
-    "late": "robot waits for a late signal",
 }
+_KINDS = {**_PLANNED, "late": "robot waits for a late signal"}
 
 
 def _figure(part: PartRow, tending: Tending, power: PowerSeries | None) -> str:
@@ -83,9 +132,7 @@ def _figure(part: PartRow, tending: Tending, power: PowerSeries | None) -> str:
     if power is not None:
         chart.lane("mode", mode_bars(power, part.span))
     for machine in tending.machines:
-        bars = [("loaded", span, "at work") for span in machine.working]
-        bars += [("empty", span, "finished, waits for the robot") for span in machine.finished]
-        chart.lane(f"{machine.name} {machine.slot or ''}".strip(), bars)
+        chart.lane(f"{machine.name} {machine.slot or ''}".strip(), _machine_bars(machine))
     if power is not None and len(power.time) > 1:
         chart.power([power])
     said = f"part {part.number}: {seconds(part.span.seconds)}, {watt_hours(part.joules)}"
@@ -93,6 +140,12 @@ def _figure(part: PartRow, tending: Tending, power: PowerSeries | None) -> str:
         f'<figure class="figure"><figcaption>{text(said)}</figcaption>'
         f"{chart.drawn(f'part_{part.number}', said)}</figure>"
     )
+
+
+def _machine_bars(machine: MachineTimes) -> list[Bar]:
+    working: list[Bar] = [("loaded", span, "at work") for span in machine.working]
+    waits = "finished, waits for the robot"
+    return [*working, *(("empty", span, waits) for span in machine.finished)]
 
 
 def _robot(part: PartRow, tending: Tending) -> list[Bar]:

@@ -89,9 +89,9 @@ def of_recording(analysis: Analysis, costs: Costs) -> WholeLine | None:
     return of_saving(cycle.savings.total, costs)
 
 
-def line_section(found: WholeLine | None, costs: Costs, in_pauses: float = 0.0) -> str:
-    """The saving among all consumers of a line, as a section of a page; "" where there is none.
-    in_pauses: its share that is saved in pauses, which other robots may not have.
+def line_section(found: WholeLine | None, costs: Costs) -> str:
+    """The saving among all consumers of a line of such robots, as a section of a page; "" where
+    there is none.
     """
     if found is None:
         return ""
@@ -114,24 +114,16 @@ def line_section(found: WholeLine | None, costs: Costs, in_pauses: float = 0.0) 
     )
     word = "less" if found.line.gain()[0] == "saved" else "more"
     hint = (
-        f"If every robot took {with_ends(found.robots)} {word}, the line would take "
-        f"{with_ends(found.line)} {word}, and the factory with its hall {with_ends(found.factory)} "
-        f"{word}. Other consumers are taken to stay as they are."
+        f"If every robot moved and stood as this one does, and took {with_ends(found.robots)} "
+        f"{word}, the line would take {with_ends(found.line)} {word}, and the factory with its "
+        f"hall {with_ends(found.factory)} {word}. Robots that stand less save less."
     )
-    if in_pauses >= _MUCH:
-        hint += (
-            f" Of this robot's saving {100.0 * in_pauses:.0f} % is in its pauses: robots that "
-            "stand less save less, so this is of a line of robots that stand as much."
-        )
     heads = ("consumer", ">today", ">as planned")
     return (
-        '<section id="whole-line"><h2>Of the whole line</h2>'
+        '<section id="whole-line"><h2>If a whole line did the same</h2>'
         f'<p class="hint">{text(hint)} {origin}</p>'
         f"{table(heads, rows, 'Of the whole line', COMPACT)}</section>"
     )
-
-
-_MUCH = 0.05  # of a saving: a smaller share is not said
 
 
 def _percent(share: float) -> str:

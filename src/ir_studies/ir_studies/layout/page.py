@@ -19,7 +19,14 @@ from ir_planner.checks import JouleInterval
 from ir_recorder.analysis.production import Amount
 from ir_recorder.report.answer import Answer
 from ir_recorder.report.bars import Piece, Row, bars, tick_step
-from ir_recorder.report.costs import Costs, assumed_section, payback, yearly_money, yearly_span
+from ir_recorder.report.costs import (
+    Costs,
+    assumed_section,
+    counted_with,
+    payback,
+    yearly_money,
+    yearly_span,
+)
 from ir_recorder.report.files import write_output
 from ir_recorder.report.number_text import (
     DASH,
@@ -487,7 +494,7 @@ def _bars(finals: Sequence[Sequence[Final]], costs: Costs) -> str:
         "90 % interval of the difference. Small: what stands how far from where it is given."
     )
     drawn = bars(rows, "saved a year")
-    return f'{drawn}<p class="hint">{text(hint)}</p>'
+    return f'{drawn}<p class="hint">{text(hint)} {counted_with(costs)}</p>'
 
 
 def _tiles(known: Sequence[Known], finals: Sequence[Sequence[Final]]) -> str:
