@@ -150,9 +150,7 @@ def test_cycles_stops_and_nights_are_all_hours_of_a_year(seed: int) -> None:
     pace = draw(10.0, 4000.0)
     in_cycles = costs.cycles_per_year(pace) * pace / 3600.0
     assert in_cycles + costs.standing_hours + costs.idle_hours == pytest.approx(8760.0)
-    said = f"the {costs.standing_hours:,.0f} h a year".replace(
-        ",", " "
-    )
+    said = f"the {costs.standing_hours:,.0f} h a year".replace(",", " ")
     assert said in counted_with(costs)
     assert "stands still" not in counted_with(replace(costs, availability=1.0))
 

@@ -115,8 +115,7 @@ def quantities(analysis: Analysis, cycle: Production, costs: Costs) -> dict[str,
         "a cycle: robot": cycle.energy,
         "robot: energy a part": cycle.energy / costs.parts_per_cycle,
         "energy a year": cycle.energy * year,
-        "robot: energy in shifts a year": cycle.energy * year,
-        "all: energy in shifts a year": cycle.energy * year,
+        "all: costs in shifts a year": cycle.energy * year * price,
         "robot: cycle": cycle.seconds,
         "robot: largest quarter of an hour": demand_watts(analysis, cycle),
         "peak power": analysis.peak_power,
@@ -214,10 +213,10 @@ def test_robots_and_months_of_a_fleet_are_sums_of_their_recordings(walked: Analy
     ]
     found = READ.figures_of(fleet_html(fleet, costs=costs))
     year = costs.energy_of_year(cycle).value
-    (one,) = [f for f in READ.called(found, "first: energy in shifts a year") if f.kind == "J"]
-    (both,) = [f for f in READ.called(found, "all: energy in shifts a year") if f.kind == "J"]
-    assert one.shows(year)
-    assert both.shows(2.0 * year)
+    (one,) = [f for f in READ.called(found, "first: costs in shifts a year") if f.kind == "EUR"]
+    (both,) = [f for f in READ.called(found, "all: costs in shifts a year") if f.kind == "EUR"]
+    assert one.shows(costs.money(year))
+    assert both.shows(2.0 * costs.money(year))
     for month in ("2026-01", "2026-02", "2026-03"):
         driven = READ.called(found, f"{month}: driven")
         if np.isfinite(member.driven - member.predicted):

@@ -44,7 +44,6 @@ from ir_recorder.report.costs import (
     idle_saving,
     idle_sentence,
     money_of_thousand,
-    small_span,
     yearly_money,
     yearly_span,
 )
@@ -413,7 +412,7 @@ def fleet_html(
         _section("Robots, those that cost most first", _robots(members, robots, prices), "robots"),
         _section("What to change first", _potential(known, summed, prices), "first"),
         _section("Month by month: driven and predicted", _months(members)),
-        _problems(left_out),
+        _problems([each for each in left_out if DRIVES_ONLY not in each]),  # the table says it
         _all_robots(members, robots, prices),
         folded(_section("Peak, and when nobody works", _around_the_clock(members, robots, prices))),
         folded(line_section(fleet_of_line(members, prices), prices)),
@@ -581,8 +580,8 @@ def _paid(members: Sequence[Member], costs: Costs) -> Paid:
 
 
 _ROBOT_HEADS = (
-    "robot", ">costs in shifts a year", ">energy in shifts a year", ">saved a year, predicted",
-    ">saved a year at night", ">a part", "change first",
+    "robot", ">costs in shifts a year", ">saved a year, predicted", ">saved a year at night",
+    "change first",
 )  # fmt: skip
 
 
@@ -595,16 +594,15 @@ def _robots(members: Sequence[Member], robots: Sequence[Robot], costs: Costs) ->
         without = len(rest) - len(others)
         name = counted(len(rest), "other robot")
         name += f"<small>{without} of them in no sum</small>" if without else ""
-        rows.append((name, *_sums(others, members, costs), DASH, DASH))
+        rows.append((name, *_sums(others, members, costs), DASH))
     summed = [robot for robot in robots if not robot.drives_only]
     if len(summed) > 1:
         recordings = counted(sum(robot.recordings for robot in summed), "file")
         name = f"<b>all</b><small>{recordings}</small>"
-        rows.append((name, *_sums(summed, members, costs), DASH, DASH))
+        rows.append((name, *_sums(summed, members, costs), DASH))
     hint = (
-        "A year is one cycle after the other in shifts, pauses at full length. Common programs: "
-        "the same stations by PTP at full speed, the controller's own timers. Small: 90 % "
-        "intervals, which add up as if all were wrong alike."
+        "Saved: against the same stations by PTP at full speed, the controller's own timers. "
+        "Small: 90 % intervals, which add up as if all were wrong alike."
     )
     if any(robot.saved is not None and robot.saved.doubt for robot in robots):
         hint += " Open: zero lies in the interval."
@@ -625,14 +623,13 @@ def _robot_row(robot: Robot, members: Sequence[Member], costs: Costs) -> tuple[s
     own = _own(members, robot)
     idle = None if robot.drives_only else _idle_saving(own, costs)
     part = robot.joules / costs.parts_per_cycle
-    made = _origins(own)
+    made = ", ".join((robot.cell, _origins(own), *([DRIVES_ONLY] if robot.drives_only else ())))
+    each = f"a part {kilowatt_hours(part)}, {money_of_thousand(part, costs)}"
     return (
-        f"{text(robot.name)}<small>{text(robot.cell)}</small><small>{text(made)}</small>"
-        + (f"<small>{DRIVES_ONLY}</small>" if robot.drives_only else ""),
-        *_yearly(robot.yearly, costs),
+        f"{text(robot.name)}<small>{text(made)}</small><small>{text(each)}</small>",
+        _yearly(robot.yearly, costs),
         _saved(robot.saved, costs),
         DASH if idle is None else _money(idle.money, costs),
-        f"{text(kilowatt_hours(part))}<small>{text(money_of_thousand(part, costs))}</small>",
         text(_first_lever(robot, own, idle, costs)),
     )
 
@@ -658,7 +655,7 @@ def _sums(robots: Sequence[Robot], members: Sequence[Member], costs: Costs) -> t
     nights = [_idle_saving(_own(members, robot), costs) for robot in robots]
     night = [idle.money for idle in nights if idle is not None]
     return (
-        *_yearly(sum_of([robot.yearly for robot in robots]), costs),
+        _yearly(sum_of([robot.yearly for robot in robots]), costs),
         _saved(sum_of(saved) if saved else None, costs),
         _money(sum_of(night), costs) if night else DASH,
     )
@@ -796,12 +793,10 @@ def _shown(name: str) -> str:
     return name.replace("_", " ").lower() if name.isupper() else modes_as_words(name)
 
 
-def _yearly(amount: Amount, costs: Costs) -> tuple[str, str]:
-    """Price of a year, and its energy, each with its interval."""
-    return (
-        _money(amount.of(costs.money), costs),
-        f"<b>{text(kilowatt_hours(amount.value))}</b>{small_span(amount, kilowatt_hours)}",
-    )
+def _yearly(amount: Amount, costs: Costs) -> str:
+    """Price of a year with its interval, and its energy."""
+    energy = f"<small>{text(kilowatt_hours(amount.value))}</small>"
+    return f"{_money(amount.of(costs.money), costs)}{energy}"
 
 
 def _money(price: Amount, costs: Costs) -> str:

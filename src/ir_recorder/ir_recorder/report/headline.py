@@ -289,7 +289,8 @@ def _paid(analysis: Analysis, costs: Costs) -> Paid:
         nights = "" if idle is None else ", nights on brakes"
         name = f"as driven, {analysis.recording.origin}{nights}"
         driven = (name, costs.energy_of_year(cycle).value)
-    return Paid(saved, common, idle, said, COMMON, driven, cycle.supply)
+    proved = analysis.recording.only_planned and analysis.recording.planned_certified
+    return Paid(saved, common, idle, said, COMMON, driven, cycle.supply, proved)
 
 
 def run_tiles(analysis: Analysis) -> str:

@@ -41,6 +41,8 @@ class Tile:
 MOVEMENTS = "movements as planned"
 PAUSES = "pauses in the planned power modes"
 """What a plan saves with, in words."""
+CERTIFIED = "No collision: certified by bounds over the whole time, not by samples."
+"""How a planned program is proved."""
 COMMON = "common program"
 """What plans are held against where nobody gave today's program."""
 _COMMON = " Common program: the same stations by PTP at 100 %, its pauses left to the controller."
@@ -52,7 +54,7 @@ class Paid:
     not known; idle: outside of the shifts. counted: what the year is
     made of, in words; before: what it is held against. driven: what else a year of it is called,
     and what that takes [J]: nothing is known of its nights, so they are as before. supply: what
-    limits the figures.
+    limits the figures. proved: whether the planned program is certified.
     """
 
     saved: Amount | None
@@ -62,6 +64,7 @@ class Paid:
     before: str = "today"
     driven: tuple[str, float] | None = None
     supply: str = ""
+    proved: bool = False
 
     def answer(
         self, costs: Costs, steps: Sequence[Step], part: tuple[float, float] | None = None
@@ -97,6 +100,8 @@ class Paid:
             said += [f"{between}." if between else "", self.supply, "What plans save is predicted."]
         if self.idle is not None:
             said.append(f"What nights save is {self.idle.basis}.")
+        if self.proved:
+            said.append(CERTIFIED)
         return " ".join(each for each in said if each)
 
     def picture(self, costs: Costs) -> str:

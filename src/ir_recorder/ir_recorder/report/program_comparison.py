@@ -129,7 +129,8 @@ def _paid(found: BeforeAfter, cell: Cell, costs: Costs) -> Paid:
     year = year_of(found, side, costs)
     today = side.saving.common * year.cycles_a_year
     counted = f", {cycles_of_year(year.pace, costs)}"
-    return Paid(year.saved, today, _idle(found, cell, costs), counted)
+    idle = _idle(found, cell, costs)
+    return Paid(year.saved, today, idle, counted, proved=side.certified)
 
 
 def tiles(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
