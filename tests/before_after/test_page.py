@@ -323,5 +323,5 @@ def test_a_program_that_hardly_differs_is_no_column(
 def test_the_head_says_what_is_proved(compared: BeforeAfter, planner: Planner) -> None:
     head = before_after_html(compared, planner.cell).partition("<main>")[0]
     assert 'class="verdict good"' in head
-    assert "mm apart, within limits, at every instant" in head
+    assert "mm kept, within limits" in head
     assert "nothing driven" in head

@@ -24,7 +24,7 @@ def test_the_savings_of_the_recording_stand_on_the_page(analysis: Analysis, page
         "25.0 %",
         "20.0 %",
         "24.0 %",
-        "1 of 3 around bodies",
+        "1 movements around bodies",
         "the controller&#x27;s own timers",
     ):
         assert words in savings_section(analysis)

@@ -105,9 +105,9 @@ def test_the_page_says_first_how_far_the_prediction_is_off(
     assert words in answer
     assert bool(answer) == bool(shares)
     if shares:
-        assert f"of {2 * len(shares)} measured ones lie in the predicted 90 % interval" in answer
+        assert f"of {2 * len(shares)} simulated ones lie in the predicted 90 % interval" in answer
         assert page.index(answer) < page.index('class="tile"')
-        assert "runs from the prediction upwards" in answer
+        assert "intervals begin at the prediction" in answer
 
 
 def test_what_lies_beyond_the_axis_is_an_arrow_at_its_end() -> None:

@@ -108,10 +108,7 @@ def before_after_common(
             asking.costed(line.common.movements) if longer and line.common is not None else before
         )
         sides.append(asking.side(LINE, cycle_time, line, waiting))
-    around = (
-        f"; {free.savings.around} of its {free.savings.across} movements had to be routed around "
-        "machines"
-    )
+    around = f"; {free.savings.around} of its movements had to be routed around machines"
     notes = (
         "today's program is a reconstruction (point to point at 100 %), not a recorded one"
         f"{around if free.savings.around else ''}",

@@ -563,7 +563,8 @@ def _planned(analysis: Analysis, planned: Sequence[PlannedMovement]) -> Producti
         steps=steps,
         savings=analysis.savings,
     )
-    return found if analysis.savings is None else _paced(found, analysis.savings.total)
+    held = analysis.savings
+    return found if held is None or held.common_seconds > 0.0 else _paced(found, held.total)
 
 
 def _paced(plan: Production, total: Saving) -> Production:

@@ -231,9 +231,9 @@ def _filling(rows: Sequence[PartRow], machines: Sequence[MachineTimes]) -> int:
 
 
 def planned_machines(cell: Cell, steps: Sequence[PlannedMovement]) -> tuple[MachineTimes, ...]:
-    """When the machines of a route work in the cycle of a plan, and when a finished part lies in
-    them: from where the robot puts one down until it takes one, the cycle repeated before and
-    after.
+    """When the machines of a route that hold one part work in the cycle of a plan, and when it lies
+    there finished: from where the robot puts one down until it takes one, the cycle repeated before
+    and after.
     """
     if cell.route is None or not steps:
         return ()
@@ -245,11 +245,11 @@ def planned_machines(cell: Cell, steps: Sequence[PlannedMovement]) -> tuple[Mach
         if step.to_station in cell.route.visits and _carries(before) != _carries(step):
             times, at = (taken, end - step.duration) if _carries(step) else (put, end)
             times.setdefault(cell.station(step.to_station).equipment, []).append(at)
-    machines = [each for each in cell.equipment if each.process > 0.0 and each.name in put]
     return tuple(
         _repeated(machine.name, machine.process, put[machine.name], taken[machine.name], period)
-        for machine in machines
-        if machine.name in taken
+        for machine in cell.equipment
+        if machine.process > 0.0 and machine.capacity + machine.buffer == 1
+        if machine.name in put and machine.name in taken
     )
 
 
@@ -272,7 +272,7 @@ def _repeated(
             working.append(Span(begin + shift, done + shift))
             if until > done:
                 finished.append(Span(done + shift, until + shift))
-    return MachineTimes(name, tuple(working), tuple(finished))
+    return MachineTimes(name, 0, tuple(working), tuple(finished))
 
 
 _CYCLES = 4  # of a part in a machine, at most

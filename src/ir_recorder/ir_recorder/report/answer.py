@@ -28,7 +28,7 @@ class Answer:
             if words:
                 parts.append(f"<div><h2>{head}</h2>{_said(words)}</div>")
         if self.costs:
-            parts.append(f"<div><h2>What it costs</h2>{''.join(map(_said, self.costs))}</div>")
+            parts.append(f"<div><h2>What energy costs</h2>{''.join(map(_said, self.costs))}</div>")
         return f'<section id="answer">{"".join(parts)}</section>\n'
 
 

@@ -33,7 +33,6 @@ from ir_recorder.report.costs import (
     IdleSaving,
     assumed_section,
     counted_with,
-    payback,
     recorded_idle_saving,
     saved_year,
     yearly_money,
@@ -56,7 +55,6 @@ from ir_recorder.report.page import PAGE_START, asset
 from ir_recorder.report.series import Curves, Json, packed, stretches
 from ir_recorder.report.shell import badge, shell
 from ir_recorder.report.tables import COMPACT, table
-from ir_recorder.report.whole_line import of_recording, with_ends
 from ir_values.files import ANYWHERE, FileRoots
 
 MOST = 12  # recordings on one page: more columns than that are not read
@@ -158,8 +156,11 @@ def _answer(analyses: Sequence[Analysis], names: Sequence[str], costs: Costs) ->
     if known[least].high < first.low:
         less = yearly_money(first.value - known[least].value, costs.currency)
         return Answer(f"{least}: {less} less a year", words, sure, f"Drive {least}.")
+    if len(names) == _BESIDE and analyses[0].program is not analyses[1].program is None:
+        agree = f"{names[1]} predicts what {names[0]} takes"
+        return Answer(agree, words, sure, "Nothing: a year of both costs alike.")
     result = f"None is shown to cost less than {names[0]}"
-    return Answer(result, words, sure, "Choose by what else they differ in: time, peak, clearance.")
+    return Answer(result, words, sure, "Choose by time, peak or clearance: Runs in figures.")
 
 
 _NAMED = 4  # recordings in a sentence
@@ -192,9 +193,9 @@ def _problems(analyses: Sequence[Analysis], names: Sequence[str]) -> str:
     if _apart(analyses):
         items.append("<li>These recordings are of different cells.</li>")
     if len({(a.recording.origin, a.recording.plant) for a in analyses}) > 1:
-        items.append(
-            "<li>These recordings are of different plants: not only the programs differ.</li>"
-        )
+        never = any(each.recording.never_driven for each in analyses)
+        why = "not all were driven" if never else "they are of different plants"
+        items.append(f"<li>Not only the programs differ: {why}.</li>")
     return (
         f'<div class="problems calm"><b>Notes</b><ul>{"".join(items)}</ul></div>' if items else ""
     )
@@ -211,7 +212,6 @@ def _paid(compared: Sequence[Compared], names: Sequence[str], costs: Costs) -> s
         ("a year of such cycles", *(_year(cycle, first, costs) for cycle in cycles)),
         ("saved by its plan, a year", *(_year_saved(cycle, costs) for cycle in cycles)),
         *_around_the_clock(analyses, cycles, costs),
-        ("energy of the whole line", *(_of_line(analysis, costs) for analysis, _ in compared)),
         ("a cycle", *(_cycle(cycle) for cycle in cycles)),
     ]
     hint = (
@@ -318,21 +318,9 @@ def _both(amount: Amount, idle: IdleSaving, costs: Costs) -> str:
     between = f"{yearly_span(gain.low, gain.high)} {costs.currency}" if gain.low < gain.high else ""
     energy = year.with_energy(costs)
     more = f"{energy} more" if word == "more" and energy else energy
-    lines = (between, more, payback(year.money, costs))
+    lines = (between, more)
     small = "".join(f"<small>{text(line)}</small>" for line in lines if line)
     return f"<b>{text(price)}</b>{small}"
-
-
-def _of_line(analysis: Analysis, costs: Costs) -> str:
-    found = of_recording(analysis, costs)
-    if found is None:
-        return DASH
-    word, line = found.line.gain()
-    return (
-        f"<b>{line.value:.1f} % {'less' if word == 'saved' else word}</b>"
-        + (f"<small>{line.low:.1f} to {line.high:.1f} %</small>" if line.high > line.low else "")
-        + f"<small>of the factory {with_ends(found.factory)}</small>"
-    )
 
 
 def _cycle(cycle: Production | None) -> str:
@@ -391,7 +379,12 @@ def _against(value: float, first: float, unit: Callable[[float], str], own: bool
     shown = f"<b>{unit(value)}</b>"
     if own or not math.isfinite(value) or not math.isfinite(first) or first == 0.0:
         return shown
-    return f"{shown}<small>{percent(value / first - 1.0)}</small>"
+    more = value / first - 1.0
+    return f"{shown}<small>{percent(more)}</small>" if _LITTLE < abs(more) < _MUCH else shown
+
+
+_LITTLE = 5e-4  # of the first: less is alike
+_MUCH = 2.0  # times it: more is another thing
 
 
 def _of_program(part: str, value: str) -> Callable[[Analysis], float]:

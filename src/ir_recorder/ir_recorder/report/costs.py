@@ -310,7 +310,7 @@ def costs_section(analysis: Analysis, costs: Costs) -> str:
         '<section id="costs"><h2>What a cycle costs</h2>'
         f"{table(heads, rows, 'What a cycle costs')}"
         f'<p class="hint">{text(origin)}{_saving_is(cycle)}. A year has '
-        f"{cycles_of_year(cycle.pace, costs)}{_waits(cycle)}.{text(notes)}"
+        f"{cycles_of_year(cycle.pace, costs)}{_waits(cycle, costs)}.{text(notes)}"
         f"{_bridge(analysis, cycle)} {counted_with(costs)}</p></section>"
     )
 
@@ -318,12 +318,19 @@ def costs_section(analysis: Analysis, costs: Costs) -> str:
 def _saving_is(cycle: Production) -> str:
     if cycle.savings is None:
         return ""
-    return "; programs and savings are predicted. Small: 90 % intervals"
+    return "; programs and savings are predicted. Small: 90 % intervals, whose ends add up"
 
 
-def _waits(cycle: Production) -> str:
-    """Why the cycles of a year are longer than the cycle, where that shows; "" elsewhere."""
-    if cycle.savings is None or seconds(cycle.pace) == seconds(cycle.seconds):
+def _waits(cycle: Production, costs: Costs) -> str:
+    """Why the cycles of a year are longer than the cycle, where that shows, and what the common
+    program needs for them where it is slower; "" elsewhere.
+    """
+    if cycle.savings is None:
+        return ""
+    if cycle.savings.common_seconds > cycle.pace:
+        more = costs.cycles_per_year(cycle.pace) * (cycle.savings.common_seconds - cycle.pace)
+        return f"; the common program would need {more / 3600.0:.0f} h more for them"
+    if seconds(cycle.pace) == seconds(cycle.seconds):
         return ""
     return f" as in the common program (this cycle takes {seconds(cycle.seconds)})"
 
@@ -336,7 +343,7 @@ def _bridge(analysis: Analysis, cycle: Production) -> str:
     if program is None or program.unshortened is None:
         return ""
     return text(
-        f" The recording took {kilowatt_hours(analysis.energy)}, what was measured before and "
+        f" The recording took {kilowatt_hours(analysis.energy)}, what was recorded before and "
         f"after included; the program in it {kilowatt_hours(program.whole.energy)}, its pauses "
         f"shortened; a cycle with full pauses {kilowatt_hours(cycle.energy)}."
     )
@@ -439,6 +446,13 @@ def yearly_money(value: float, currency: str) -> str:
     return f"{value:.2f} {currency}" if abs(value) < 1.0 else money(value, currency)
 
 
+def money_of(amount: Amount, currency: str) -> str:
+    """An amount of a year that stands beside its interval: whole where the ends are."""
+    if amount.low < amount.high and max(abs(amount.low), abs(amount.high)) >= _NO_CENTS:
+        return f"{whole(amount.value)} {currency}"
+    return yearly_money(amount.value, currency)
+
+
 def together(amounts: Sequence[float]) -> float:
     """The sum of amounts of a year as they are shown, each rounded: it adds up on the page."""
     return sum(_rounded(each) for each in amounts)
@@ -539,7 +553,7 @@ def counted_with(costs: Costs) -> str:
         f"{origin if own else 'all assumed'}"
     )
     return (
-        f'{text(words)}: <a href="#assumed">all values, and how to give yours</a>. '
+        f'{text(words)}<a class="screen" href="#assumed">: all values, and how to give yours</a>. '
         f"{_stands(costs)}Each amount is rounded by itself."
     )
 

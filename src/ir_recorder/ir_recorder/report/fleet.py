@@ -43,7 +43,10 @@ from ir_recorder.report.costs import (
     idle_money,
     idle_saving,
     idle_sentence,
+    money_of,
     money_of_thousand,
+    payback,
+    together,
     yearly_money,
     yearly_span,
 )
@@ -329,10 +332,10 @@ def fleet_of_line(members: Sequence[Member], costs: Costs) -> WholeLine | None:
     """What all plans together save in a year, as a share of the line and of the factory; None where
     no recording says it, or it is open whether anything is saved.
     """
-    together, common = _saved_and_common(members, costs)
-    if together is None or together.doubt:
+    saved, common = _saved_and_common(members, costs)
+    if saved is None or saved.doubt:
         return None
-    return of_whole_line(together, common, costs)
+    return of_whole_line(saved, common, costs)
 
 
 def by_mode(members: Sequence[Member], costs: Costs) -> dict[str, dict[str, float]]:
@@ -384,7 +387,9 @@ _STYLE = """
   section#first table.compact { max-width: none; } #first td:has(> .bar) { width: 45%; }
 }
 @media (max-width: 700px) {
-  #first tr > :nth-child(3) { display: none; } #robots table.cards td.no { display: block; }
+  #first tr > :nth-child(3) { display: none; }
+  #robots table.cards td.no:not(:last-child) { display: block; }
+  #robots table.cards tr:has(> td.n) { grid-template-columns: repeat(3, minmax(0, 1fr)); }
 }
 """
 
@@ -429,12 +434,19 @@ def fleet_html(
     year = paid.picture(prices)
     shown = [tile for tile in _tiles(paid, known, robots, prices) if tile is not None]
     return shell(
-        f"{counted(len(robots), 'robot')}: {_origins(members)}",
+        f"{_title(robots)}: {_origins(members)}",
         "a year of each robot, one cycle after the other",
         f"{first}{year}{row_of(shown) if shown else ''}{''.join(sections)}",
         badges=[_badge(paid, prices)],
         style=_STYLE,
     )
+
+
+def _title(robots: Sequence[Robot]) -> str:
+    """How many robots, and how many of them are in the sums."""
+    summed = sum(not robot.drives_only for robot in robots)
+    of = f", {summed} in the sums" if summed < len(robots) else ""
+    return f"{counted(len(robots), 'robot')}{of}"
 
 
 def _answer(paid: Paid, robots: Sequence[Robot], costs: Costs) -> Answer:
@@ -461,7 +473,16 @@ def _answer(paid: Paid, robots: Sequence[Robot], costs: Costs) -> Answer:
     if paid.saved is not None and paid.saved.doubt:
         result = f"Open whether anything is saved: {result}"
     saved = year.with_energy(costs)
-    parts = [f"of {counted(len(summed), 'robot')} together", f"{saved} {less}" if saved else ""]
+    nights = 0.0 if paid.idle is None else paid.idle.left_alone
+    today = together((costs.money(paid.common), nights))
+    parts = [
+        f"of {counted(len(summed), 'robot')} together",
+        f"{saved} {less}" if saved else "",
+        f"{100.0 * gain.value / today:.1f} % of {yearly_money(today, costs.currency)}"
+        if paid.saved is not None and today > 0.0
+        else "",
+        payback(year.money, costs),
+    ]
     words = ", ".join(part for part in parts if part)
     return Answer(result, f"{words}.", paid.sure(costs), _steps(paid, robots, costs))
 
@@ -538,19 +559,22 @@ def _tiles(
         "largest quarter of an hour",
         watts(peak),
         (
-            "in shifts, pauses in their power modes; as if all robots' largest came at once",
-            _outside(paid.idle, peak),
+            "in shifts, as if all robots' largest came at once",
+            _outside(paid.idle),
             demand_money(peak, costs),
         ),
     )
     return [costs_tile, demand]
 
 
-def _outside(idle: IdleSaving | None, peak: float) -> str:
-    """That rest takes more than the largest quarter of an hour of the shifts, where it does."""
-    if idle is None or idle.watts_left_alone <= peak:
+def _outside(idle: IdleSaving | None) -> str:
+    """What rest takes outside of the shifts, before and then."""
+    if idle is None:
         return ""
-    return f"outside, on closed brakes, it is {watts(idle.watts_left_alone)}"
+    return (
+        f"outside {watts(idle.watts_left_alone)} on closed brakes, {watts(idle.watts_deepest)} in "
+        f"{idle.mode}"
+    )
 
 
 def _as_made(members: Sequence[Member]) -> str:
@@ -800,7 +824,7 @@ def _yearly(amount: Amount, costs: Costs) -> str:
 
 
 def _money(price: Amount, costs: Costs) -> str:
-    return f"<b>{text(yearly_money(price.value, costs.currency))}</b>{_small_ends(price, costs)}"
+    return f"<b>{text(money_of(price, costs.currency))}</b>{_small_ends(price, costs)}"
 
 
 def _small_ends(price: Amount, costs: Costs) -> str:
@@ -894,14 +918,14 @@ def _night(
     members: Sequence[Member], robots: Sequence[Robot], costs: Costs
 ) -> list[tuple[float, str, Mapping[str, float]]]:
     """Rest outside of the shifts as a measure; none where it saves nothing."""
-    together = _idle_saving(members, costs)
-    if together is None:
+    nights = _idle_saving(members, costs)
+    if nights is None:
         return []
     own = {robot.name: _idle_saving(_own(members, robot), costs) for robot in robots}
     energies = {name: idle.energy.value for name, idle in own.items() if idle is not None}
-    basis = f"{together.mode} instead of closed brakes, {together.basis}"
+    basis = f"{nights.mode} instead of closed brakes, {nights.basis}"
     name = f"at night and at weekends<small>{text(basis)}</small>"
-    return [(together.saved, name, energies)]
+    return [(nights.saved, name, energies)]
 
 
 def _own(members: Sequence[Member], robot: Robot) -> list[Member]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime, timedelta
 
-from ir_msgs_py.savings import one_sided
+from ir_msgs_py.savings import ProgramSavings, one_sided
 from ir_recorder.analysis import Analysis, Finding, ProgramTotals, Share, Verdict, summary
 from ir_recorder.analysis.production import (
     DRIVES_ONLY,
@@ -18,8 +18,6 @@ from ir_recorder.analysis.production import (
     drives_only,
     levers,
     planned_clearance,
-    planned_interval,
-    planned_share,
     production_of,
     saved_amount,
 )
@@ -41,7 +39,6 @@ from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import (
     DASH,
     interval,
-    joules,
     kilograms,
     kilowatt_hours,
     millimetres,
@@ -190,7 +187,9 @@ def tiles(analysis: Analysis, costs: Costs | None = None) -> str:
 def _demand(analysis: Analysis, cycle: Production, costs: Costs) -> Tile:
     peak = demand_watts(analysis, cycle)
     return Tile(
-        "largest quarter of an hour", watts(peak), (demand_money(peak, costs), cycle.supply)
+        "largest quarter of an hour",
+        watts(peak),
+        (cycle.origin, demand_money(peak, costs), cycle.supply),
     )
 
 
@@ -206,7 +205,8 @@ def driven_tiles(analysis: Analysis) -> list[Tile]:
 
 
 def _peak(analysis: Analysis) -> Tile:
-    return Tile("peak power", watts(analysis.peak_power), ("of a 10 ms reading",))
+    origin = analysis.recording.origin
+    return Tile("peak power", watts(analysis.peak_power), (f"of a 10 ms reading, {origin}",))
 
 
 def answer(analysis: Analysis, costs: Costs) -> str:
@@ -247,6 +247,14 @@ def _without_saving(analysis: Analysis, cycle: Production, paid: Paid, costs: Co
     if analysis.recording.only_planned:
         do.append(NO_COMPARISON)
     part = money_of_thousand(cycle.energy / costs.parts_per_cycle, costs)
+    tending = analysis.tending
+    beside = ""
+    if tending is not None:
+        parts = tending.steady or tending.parts
+        planned = sum(part.planned_joules for part in parts) / len(parts)
+        beside = (
+            f"A part takes {kilowatt_hours(cycle.energy)}, as predicted {kilowatt_hours(planned)}."
+        )
     between = f"90 % interval {yearly_span(price.low, price.high)} {costs.currency}."
     name = f"{cycle.name[0].upper()}{cycle.name[1:]}"
     origin = f"{name}." if cycle.origin in cycle.name else f"{name}, {cycle.origin}."
@@ -254,7 +262,11 @@ def _without_saving(analysis: Analysis, cycle: Production, paid: Paid, costs: Co
     return Answer(
         f"{yearly_money(price.value, costs.currency)} a year in shifts",
         f"{taken}; {cycles_of_year(cycle.pace, costs)}.{nights}",
-        " ".join([between if price.low < price.high else "", origin, cycle.supply]).strip(),
+        " ".join(
+            each
+            for each in (between if price.low < price.high else "", origin, beside, cycle.supply)
+            if each
+        ),
         do,
         [f"Parts: {part}", *a_night(paid.idle, costs)],
     )
@@ -289,8 +301,29 @@ def _paid(analysis: Analysis, costs: Costs) -> Paid:
         nights = "" if idle is None else ", nights on brakes"
         name = f"as driven, {analysis.recording.origin}{nights}"
         driven = (name, costs.energy_of_year(cycle).value)
+    run = ""
+    more = more_parts(cycle.savings)
+    if driven is not None:
+        run = (
+            f"As driven ({analysis.recording.origin}) a cycle takes "
+            f"{kilowatt_hours(cycle.energy)}, as planned {kilowatt_hours(total.planned)}."
+        )
     proved = analysis.recording.only_planned and analysis.recording.planned_certified
-    return Paid(saved, common, idle, said, COMMON, driven, cycle.supply, proved)
+    return Paid(saved, common, idle, said, COMMON, driven, cycle.supply, proved, run, more)
+
+
+def more_parts(savings: ProgramSavings) -> str:
+    """How many more parts an hour a plan makes than the common program, in words; "" where both
+    make as many.
+    """
+    if savings.common_seconds <= 0.0:
+        return ""
+    planned = savings.total.seconds
+    more = 100.0 * (savings.common_seconds / planned - 1.0)
+    return (
+        f"{more:.1f} % more parts an hour, one cycle each {seconds(planned)} instead of "
+        f"{seconds(savings.common_seconds)}"
+    )
 
 
 def run_tiles(analysis: Analysis) -> str:
@@ -299,7 +332,7 @@ def run_tiles(analysis: Analysis) -> str:
     if program is None:
         return ""
     parts = _parts(program, analysis.recording.origin)
-    own = _html([_whole(analysis, program, joules), *parts, _clearance(analysis)])
+    own = _html([_whole(analysis, program), *parts, _clearance(analysis)])
     return (
         '<details class="part"><summary><h2>This run in figures</h2></summary>'
         f'<div class="tiles">{own}</div></details>'
@@ -314,21 +347,14 @@ def _planned(analysis: Analysis) -> list[Tile]:
     """Figures of a plan that was not driven, all predicted."""
     steps = analysis.recording.planned
     tiles = []
-    whole = planned_share(steps, "whole")
-    if whole is not None:
-        within = planned_interval(analysis.recording)
-        spread = f"90 % interval {span_of(*within, kilowatt_hours)}" if within is not None else ""
-        why = _says(one_sided(whole.energy, *within)) if within is not None else ""
-        parts = (planned_share(steps, part) for part in ("movements", "pauses"))
-        own = [
-            f"{found.name} {kilowatt_hours(found.energy)} in {seconds(found.seconds)}"
-            for found in parts
-            if found is not None
-        ]
-        said = f"in {seconds(whole.seconds)}, predicted"
-        tiles.append(
-            Tile("planned program", kilowatt_hours(whole.energy), (said, *own, spread, why))
-        )
+    cycle = production_of(analysis)
+    if cycle is not None:
+        within = (cycle.low, cycle.high)
+        known = cycle.low < cycle.high
+        spread = f"90 % interval {span_of(*within, kilowatt_hours)}" if known else ""
+        why = _says(one_sided(cycle.energy, *within))
+        said = f"in {seconds(cycle.seconds)}, predicted"
+        tiles.append(Tile("planned program", kilowatt_hours(cycle.energy), (said, spread, why)))
     near = millimetres(planned_clearance(steps))
     proved = analysis.recording.planned_certified
     proof = "proved: free of collision and within all limits" if proved else ""
@@ -395,7 +421,9 @@ def _unshortened(program: ProgramTotals) -> Tile | None:
     full = program.unshortened
     if full is None:
         return None
-    cut = f"pauses of {seconds(full.full_pauses)} instead of {seconds(full.run_pauses)}"
+    cut = (
+        f"pauses in power modes {seconds(full.full_pauses)}, in the run {seconds(full.run_pauses)}"
+    )
     if math.isnan(full.energy):
         return Tile(
             "cycle with full pauses", "not known", ("the pauses of the run don't match the cell's",)
@@ -432,17 +460,16 @@ def _parts(program: ProgramTotals, origin: str) -> list[Tile]:
     of_run = share(waiting.energy, program.whole.energy)
     said = f"{seconds(waiting.seconds)}, {of_run} of the run's energy"
     lines = (said, "signals and answers; in no plan")
-    return [*parts, Tile("waiting between steps", joules(waiting.energy), lines)]
+    return [*parts, Tile("waiting between steps", kilowatt_hours(waiting.energy), lines)]
 
 
 def _part(name: str, found: Share, planned: Share, whole: Share, origin: str) -> Tile:
     of_run = share(found.energy, whole.energy)
-    against = (
-        f"predicted {joules(planned.energy)}, {_against(found.energy, planned.energy, origin)}"
-    )
+    compared = _against(found.energy, planned.energy, origin)
+    against = f"predicted {kilowatt_hours(planned.energy)}, {compared}"
     return Tile(
         name,
-        joules(found.energy),
+        kilowatt_hours(found.energy),
         (f"{seconds(found.seconds)}, {of_run} of the run's energy", against),
     )
 

@@ -109,6 +109,9 @@ def report_html(
     name = analysis.cell.name if analysis.cell is not None else analysis.recording.path.stem
     data = page_data(analysis, drawn)
     controller = load_power_data() if analysis.cell is None else analysis.cell.robot.controller
+    planned = analysis.recording.only_planned
+    cycle = costs_section(analysis, prices)
+    rest = clock_section(analysis, prices)
     parts = {
         "title": text(f"{name}: {_subject(analysis)}"),
         "name": text(f"{name}: {_subject(analysis)}"),
@@ -119,11 +122,11 @@ def report_html(
         "paid": answer(analysis, prices),
         "tiles": tiles(analysis, prices),
         "run": run_tiles(analysis),
-        "costs": folded(costs_section(analysis, prices), paper=True),
+        "costs": cycle if planned else folded(cycle, paper=analysis.savings is not None),
         "front": folded(front_section(analysis, front)),
         "levers": lever_section(analysis, prices),
         "assumed": assumed_section(prices),
-        "around": folded(clock_section(analysis, prices)),
+        "around": rest if planned else folded(rest, paper=True),
         "line": folded(line_section(of_recording(analysis, prices), prices)),
         "engineers": _engineers(analysis, checks, joules(controller.dc_link_capacity_energy)),
         "unmoved": "" if _moves(analysis) else " hidden",
@@ -162,11 +165,11 @@ def _engineers(analysis: Analysis, checks: Sequence[Finding], capacity: str) -> 
             _CARRIED.format(text(capacity), " Select a step to see it." if analysis.steps else ""),
             step_table(analysis),
             "steps",
-            unfolded=analysis.recording.only_planned,
+            printed=analysis.recording.only_planned,
         ),
         fold("Stations and power modes", "", places + modes),
         fold(
-            "Two measurements",
+            "Meter and positions",
             _MEASURED,
             measurement_table(agreement(analysis)),
             "measurements",
@@ -192,8 +195,10 @@ _CONSUMERS = (
     "capacitors.</p>"
 )
 _CARRIED = (
-    '<p class="hint">Plans carry the capacitors\' charge (up to {}) from step to step; waiting in '
-    "between takes some of it.{}</p>"
+    '<p class="hint">Predicted without losses that the data sheet puts at zero: they can only add, '
+    "so most 90 % intervals lie above. Pauses include the way into their mode and back. Clearance: "
+    "the least over all pairs that may not touch. Plans carry the capacitors' charge (up to {}) "
+    "from step to step.{}</p>"
 )
 _MEASURED = (
     '<p class="hint">Direct: the power meter. Indirect: recorded positions alone, differentiated '
@@ -208,18 +213,15 @@ _RESTING = (
 
 
 def fold(
-    head: str, hint: str, body: str, name: str = "", *, kept: bool = False, unfolded: bool = False
+    head: str, hint: str, body: str, name: str = "", *, kept: bool = False, printed: bool = False
 ) -> str:
-    """A part that opens when its heading is chosen, or is open at first (unfolded); "" where its
-    body (HTML) shows neither a table nor bars, unless it is kept.
+    """A part that opens when its heading is chosen, printed or not; "" where its body (HTML) shows
+    neither a table nor bars, unless it is kept.
     """
     if not kept and "<table" not in body and 'class="row"' not in body:
         return ""
     own = f' id="{name}"' if name else ""
-    kind = "part"
-    if unfolded:
-        own += " open"
-        kind += " paper"
+    kind = "part paper" if printed else "part"
     title = f"<summary><h2>{text(head)}</h2></summary>"
     return f'<details class="{kind}"{own}>{title}{hint}{body}</details>'
 

@@ -14,6 +14,7 @@ from ir_recorder.report.costs import (
     Costs,
     IdleSaving,
     SavedYear,
+    money_of,
     money_of_thousand,
     payback,
     saved_year,
@@ -41,10 +42,11 @@ class Tile:
 MOVEMENTS = "movements as planned"
 PAUSES = "pauses in the planned power modes"
 """What a plan saves with, in words."""
-CERTIFIED = "No collision: certified by bounds over the whole time, not by samples."
+CERTIFIED = "No collision: certified by bounds at every instant, not by samples."
 """How a planned program is proved."""
 COMMON = "common program"
 """What plans are held against where nobody gave today's program."""
+_ROUNDED = " Each amount is rounded by itself."
 _COMMON = " Common program: the same stations by PTP at 100 %, its pauses left to the controller."
 
 
@@ -54,7 +56,8 @@ class Paid:
     not known; idle: outside of the shifts. counted: what the year is
     made of, in words; before: what it is held against. driven: what else a year of it is called,
     and what that takes [J]: nothing is known of its nights, so they are as before. supply: what
-    limits the figures. proved: whether the planned program is certified.
+    limits the figures. proved: whether the planned program is certified. run: what was driven, in
+    a sentence. more: what else the plan gains.
     """
 
     saved: Amount | None
@@ -65,6 +68,8 @@ class Paid:
     driven: tuple[str, float] | None = None
     supply: str = ""
     proved: bool = False
+    run: str = ""
+    more: str = ""
 
     def answer(
         self, costs: Costs, steps: Sequence[Step], part: tuple[float, float] | None = None
@@ -79,7 +84,7 @@ class Paid:
         today = together((costs.money(self.common), nights))
         energy = year.with_energy(costs)
         share = f"{_percent(gain.value, today)} of {yearly_money(today, costs.currency)}"
-        said = (f"{energy} {less}" if energy else "", share, payback(year.money, costs))
+        said = (f"{energy} {less}" if energy else "", share, payback(year.money, costs), self.more)
         result = f"{yearly_money(gain.value, costs.currency)} {less} a year"
         if self.saved is not None and self.saved.doubt:
             result = f"Open whether anything is saved: {result}"
@@ -98,8 +103,10 @@ class Paid:
         if self.saved is not None:
             between = _between(self.year(costs).money.gain()[1], costs)
             said += [f"{between}." if between else "", self.supply, "What plans save is predicted."]
+        said.append(self.run)
         if self.idle is not None:
-            said.append(f"What nights save is {self.idle.basis}.")
+            late = "a robot that is woken late delays the first cycle"
+            said.append(f"What nights save is {self.idle.basis}; {late}.")
         if self.proved:
             said.append(CERTIFIED)
         return " ".join(each for each in said if each)
@@ -124,7 +131,7 @@ class Paid:
         pale = " Pale: at night and at weekends." if self.idle is not None else ""
         whisker = " Whisker: 90 % interval of what is saved." if between else ""
         common = _COMMON if self.before == COMMON else ""
-        hint = f"In full colour: in shifts{self.counted}.{pale}{whisker}{common}"
+        hint = f"In full colour: in shifts{self.counted}.{pale}{whisker}{common}{_ROUNDED}"
         return (
             f'<section id="year"><h2>Energy costs of a year</h2>'
             f'{bars(rows, "energy costs of a year")}<p class="hint">{text(hint)}</p></section>'
@@ -173,7 +180,7 @@ def at_night(idle: IdleSaving) -> str:
 
 def with_span(money: Amount, costs: Costs) -> str:
     """An amount of a year, its 90 % interval in brackets."""
-    shown = yearly_money(money.value, costs.currency)
+    shown = money_of(money, costs.currency)
     return f"{shown} ({yearly_span(money.low, money.high)})" if money.low < money.high else shown
 
 

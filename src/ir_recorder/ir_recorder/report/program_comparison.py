@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ir_description import Cell
-from ir_msgs_py.savings import BeforeAfter, Side, StepChange
+from ir_msgs_py.savings import BeforeAfter, Side, StepChange, one_sided
 from ir_recorder.analysis.production import (
     DRIVES_ONLY,
     OPEN,
@@ -35,6 +35,7 @@ from ir_recorder.report.costs import (
     demand_money,
     how_to_hibernate,
     idle_saving,
+    money_of,
     share_between,
     yearly_money,
     yearly_span,
@@ -157,7 +158,7 @@ def tiles(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
             Tile(
                 "cycle time",
                 seconds(report.duration),
-                (f"today {seconds(today.duration)}", f"of the program \u201c{side.name}\u201d"),
+                (f"today {seconds(today.duration)}", f"{seconds(_standing(side))} of it pauses"),
             ),
             Tile(
                 "largest quarter of an hour",
@@ -168,13 +169,19 @@ def tiles(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
                 "peak power",
                 watts(report.peak_power),
                 (
-                    span_of(*side.peak, watts),
+                    f"90 % interval {span_of(*side.peak, watts)}",
+                    one_sided(report.peak_power, *side.peak),
                     f"today {watts(today.peak_power)}",
                     "of a 10 ms reading",
                 ),
             ),
         ]
     )
+
+
+def _standing(side: Side) -> float:
+    """Seconds of its pauses."""
+    return sum(hop.seconds for hop in side.hops if hop.is_pause)
 
 
 def figure_table(found: BeforeAfter, costs: Costs) -> str:
@@ -278,7 +285,7 @@ def change_table(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     ]
     idle = _idle(found, cell, costs)
     if idle is not None:
-        words = f"{at_night(idle)}, as the controller does by itself"
+        words = f"{at_night(idle)}, which the controller closes by itself today"
         where = f"at night and at weekends<small>{WORK[MODE]}, {idle.basis}</small>"
         priced.insert(0, (idle.money, (where, text(words), DASH)))
     most = max((price.value for price, _ in priced), default=0.0)
@@ -290,8 +297,12 @@ def change_table(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     rest = whole_year.value - sum(price.value for price, _ in priced)
     if rows and whole_year.value > 0.0:
         other = text(yearly_money(rest, costs.currency))
-        rows.append(("all other movements and pauses", "", "", other, bar(rest, most, "planned")))
-        rows.append(("<b>together</b>", "", "", _price(whole_year, costs), ""))
+        saved = found.planned.saving.saved
+        left = saved - sum(change.saving.saved for change in found.changes)
+        cells = (text(watt_hours(left)), other, bar(rest, most, "planned"))
+        rows.append(("all other movements and pauses", "", *cells))
+        cells = (_cell(watt_hours(saved)), _price(whole_year, costs), "")
+        rows.append(("<b>together</b>", "", *cells))
     none = "" if found.changes else '<p class="empty">No change saves as much as a joule.</p>'
     heads = ("where", "what to do", ">saved a cycle", ">saved a year", "")
     return none + (table(heads, rows, "Changes") if rows else "")
@@ -300,9 +311,7 @@ def change_table(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
 def _price(amount: Amount, costs: Costs) -> str:
     """Money of a year with its interval."""
     ends = f"{yearly_span(amount.low, amount.high)} {costs.currency}"
-    return _cell(
-        yearly_money(amount.value, costs.currency), ends if amount.high > amount.low else ""
-    )
+    return _cell(money_of(amount, costs.currency), ends if amount.high > amount.low else "")
 
 
 def _change(change: StepChange) -> tuple[str, ...]:
@@ -332,7 +341,8 @@ _SECOND = 0.01  # s: as seconds are shown
 
 def hop_table(found: BeforeAfter) -> str:
     """Seconds and joules of every movement and pause, matched by their stops."""
-    sides = [side for side in (found.today, *found.sides) if side.found]
+    alike = (side for side in found.sides if side.found and not _alike(found, side))
+    sides = [found.today, *alike]
     keyed = [dict(_keyed(side)) for side in sides]
     keys = list(dict.fromkeys(key for own in keyed for key in own))
     rows = [(_numbered(*key), *(own.get(key, DASH) for own in keyed)) for key in keys]
@@ -363,8 +373,8 @@ def _keyed(side: Side) -> Sequence[tuple[tuple[str, int], str]]:
 def assumptions(costs: Costs) -> str:
     """What the amounts of money and their intervals mean, where they stand."""
     said = "A 90 % interval holds the true figure in nine of ten cases."
-    link = '<a href="#basis">What the figures rest on</a>'
-    return f'<p class="hint">{counted_with(costs)} {said} {link}.</p>'
+    link = '<a class="screen" href="#basis">What the figures rest on.</a>'
+    return f'<p class="hint">{counted_with(costs)} {said} {link}</p>'
 
 
 def basis_section(found: BeforeAfter, cell: Cell) -> str:
@@ -480,8 +490,8 @@ def _badge(found: BeforeAfter) -> str:
         return badge("Not proved: see Notes", "bad")
     kept = [step.report.safety_distance for step in side.movements if not step.is_pause]
     apart = max(kept, default=0.0)
-    least = f", {millimetres(apart)} apart" if apart > 0.0 else ""
-    return badge(f"Proved: no collision{least}, within limits, at every instant", "good")
+    least = f", safety distance {millimetres(apart)} kept" if apart > 0.0 else ""
+    return badge(f"Proved: no collision{least}, within limits", "good")
 
 
 def _proof(side: Side) -> str:
@@ -518,7 +528,7 @@ def write_before_after(
 def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None) -> str:
     """The page as text; without `costs` with those that are assumed."""
     prices = costs or Costs()
-    there = [found.today, *(side for side in found.sides if side.found)]
+    there = [found.today, *(side for side in found.sides if side.found and not _alike(found, side))]
     data = {
         "end": max(side.report.duration for side in there),
         "cell": cell_scene(cell),

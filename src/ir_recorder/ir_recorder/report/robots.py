@@ -42,7 +42,7 @@ from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import (
     DASH,
     kilowatt_hours,
-    percent,
+    number,
     seconds,
     text,
     watt_hours,
@@ -102,26 +102,27 @@ def _answer(
     every = analyses.values()
     driven = sum(map(driven_joules, every))
     predicted = sum(map(predicted_joules, every))
-    sure = f"{checked(checks)[1].capitalize()}."
+    found = ", ".join(f"{check.name} {number(check.measured, check.unit)}" for check in checks)
+    sure = f"{checked(checks)[1].capitalize()}: {found}."
     if predicted > 0.0:
         sure = (
-            f"One {next(iter(every)).recording.origin} run: {percent(driven / predicted - 1.0)} "
-            f"against the plan, which knows no waits for signals. {sure}"
+            f"One {next(iter(every)).recording.origin} run: "
+            f"{100.0 * (driven / predicted - 1.0):+.1f} % against the plan, which knows no waits "
+            f"for signals. {sure}"
         )
     if cycle is None:
         words = "No cycle of all robots was driven to its end, or its energy is not known."
         return Answer("A year is not known", words, sure)
     year = costs.energy_of_year(cycle).value
     part = cycle.energy / costs.parts_per_cycle
-    result = f"{yearly_money(costs.money(year), costs.currency)} a year"
+    result = f"{yearly_money(costs.money(year), costs.currency)} a year in shifts"
     words = (
-        f"for all robots in shifts. A part takes {kilowatt_hours(part)}, "
-        f"{money_of_thousand(part, costs)}."
+        f"for all robots. A part takes {kilowatt_hours(part)}, {money_of_thousand(part, costs)}."
     )
     return Answer(result, words, sure, _to_do(analyses, cycle, costs))
 
 
-def _to_do(analyses: Mapping[str, Analysis], cycle: Production, costs: Costs) -> str:
+def _to_do(analyses: Mapping[str, Analysis], cycle: Production, costs: Costs) -> list[str]:
     """What rest outside of the shifts saves, and who waits for the others."""
     idle = _idle_of_all(analyses, costs)
     said = []
@@ -138,7 +139,7 @@ def _to_do(analyses: Mapping[str, Analysis], cycle: Production, costs: Costs) ->
             f"Of each cycle of {seconds(cycle.seconds)} {longest} waits "
             f"{seconds(waits[longest])} for signals: it may move slower, or take over work."
         )
-    return " ".join(said)
+    return said
 
 
 def _idle_of_all(analyses: Mapping[str, Analysis], costs: Costs) -> IdleSaving | None:

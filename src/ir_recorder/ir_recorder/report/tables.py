@@ -99,13 +99,14 @@ def _planned_table(steps: Sequence[PlannedMovement]) -> str:
             str(place),
             text(modes_as_words(step_label(step))),
             text(step.load or DASH),
-            f"{step.duration:.2f} s",
+            seconds(step.duration),
             joules(step.report.energy) + _predicted(step.report),
             watts(step.report.energy / step.duration) if step.duration > 0.0 else DASH,
             DASH if step.is_pause else millimetres(step.report.min_clearance),
             _certificate(step),
         )
         for place, step in enumerate(steps, start=1)
+        if step.duration > 0.0
     )
     return table(heads, rows, "Steps of the plan")
 
@@ -468,8 +469,8 @@ def savings_lines(analysis: Analysis) -> list[str]:
 def _rows(analysis: Analysis, savings: ProgramSavings) -> list[Row]:
     """Name, figures and baseline; the row of pauses only where there are any."""
     common = (
-        f"synchronous S-curve PTP at 100 % through the same stations ({savings.around} of "
-        f"{savings.across} around bodies)"
+        f"synchronous S-curve PTP at 100 % through the same stations ({savings.around} movements "
+        "around bodies)"
     )
     shortened = (
         " (pauses shortened)" if analysis.recording.fact(contents.UNSHORTENED_PAUSES) else ""

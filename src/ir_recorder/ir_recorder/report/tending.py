@@ -63,13 +63,6 @@ def _planned(analysis: Analysis) -> str:
     for machine in planned_machines(cell, steps):
         chart.lane(machine.name, _machine_bars(machine))
     said = f"a cycle of {seconds(ends[-1])}"
-    savings = analysis.savings
-    if savings is not None and savings.common_seconds > 0.0:
-        more = 100.0 * (savings.common_seconds / ends[-1] - 1.0)
-        said += (
-            f"; the common program needs {seconds(savings.common_seconds)}: the plan makes "
-            f"{more:.1f} % more parts an hour"
-        )
     return (
         '<section id="tending"><h2>Who works and who waits</h2>'
         f'{legend(_PLANNED)}<figure class="figure"><figcaption>{text(said)}</figcaption>'

@@ -533,7 +533,7 @@ def _cell_section(
             parts.append(f"<h3>{head}</h3>{table(_HEADS, rows, f'{title}: {head.lower()}')}")
     shown = picture + "".join(parts)
     head = f"<summary><h2>{text(title)}</h2></summary>"
-    return f'<details class="part paper">{head}{shown}</details>'
+    return f'<details class="part">{head}{shown}</details>'
 
 
 def _row(found: Figures) -> tuple[str, ...]:

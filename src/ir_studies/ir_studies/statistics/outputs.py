@@ -27,16 +27,16 @@ from ir_values.files import ANYWHERE
 # Drawing of paired comparisons: a dot per pair, a bar for the interval of the mean.
 
 WIDTH = 420.0  # as narrow as a telephone, so that its letters stay readable there
-LINE = 26.0
+LINE = 30.0
 _LETTER = 7.6  # of a name in bold, on average
 _GAP = 26.0  # between names and axis: half of the first tick's words
 _RIGHT = 26.0
 _WORDS = 28.0  # more, for what is said beside an arrow
 _TOP = 8.0
 _BOTTOM = 48.0
-_INSIDE = (2.0, 98.0)  # percentiles that the axis holds; dots outside are drawn at its edge
-_SPREAD = 7.0  # up and down that dots are moved apart
-_BAR = 18.0  # high
+_INSIDE = (10.0, 90.0)  # percentiles that the axis holds; dots outside are arrows at its edge
+_SPREAD = 10.0  # up and down that dots are moved apart
+_BAR = 22.0  # high
 _WIDER = 2.0  # than the span, what is divided into ticks: beside the names there is room for five
 
 
@@ -349,8 +349,8 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
             "Asynchronous against synchronous",
             (">asynchronous, mean", ">synchronous, mean"),
         ),
-        "left_out": folded(_left_out(found), paper=True),
-        "comparison_dots": dots(varied, "asynchronous less synchronous, in percent of synchronous"),
+        "left_out": folded(_left_out(found)),
+        "comparison_dots": "".join(dots(own, _ASYNCHRONOUS) for own in _by_axis(varied)),
         "agreements": _table(
             found.agreements, "Energies of a movement", (">energy, mean", ">direct, mean")
         ),
@@ -360,6 +360,16 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
         "settings": settings_table(settings.budget),
     }
     return page("statistics", head, parts)
+
+
+_ASYNCHRONOUS = "asynchronous less synchronous, in percent of synchronous"
+_TIME_AND_ENERGY = ("s", "J")
+
+
+def _by_axis(comparisons: Sequence[Comparison]) -> tuple[list[Comparison], list[Comparison]]:
+    """Time and energy, and natural values, which differ by much more: each has an axis."""
+    first = [each for each in comparisons if each.unit in _TIME_AND_ENERGY]
+    return first, [each for each in comparisons if each not in first]
 
 
 def _answer(found: Findings) -> Answer | None:
@@ -441,7 +451,7 @@ def _predicted(found: Findings) -> tuple[str, str]:
         result = "Predicted energies are not shown to be off"
     if math.isfinite(found.covered):
         inside = round(found.covered * found.driven)
-        words += f" {inside} of {found.driven} measured ones lie in the predicted 90 % interval"
+        words += f" {inside} of {found.driven} simulated ones lie in the predicted 90 % interval"
         words += f"{_one_sided(found)}."
     return result, words
 
@@ -457,8 +467,8 @@ def _one_sided(found: Findings) -> str:
     if found.upwards <= _MOSTLY:
         return ""
     return (
-        f", which of {round(found.upwards * found.driven)} runs from the prediction upwards: what "
-        "robots may take more, by their data sheet"
+        f"; {round(found.upwards * found.driven)} intervals begin at the prediction, as losses can "
+        "only add to the data sheet"
     )
 
 
@@ -475,7 +485,7 @@ def _tiles(found: Findings) -> list[Tile]:
             continue
         within = f"90 % interval {_interval(each.mean)} %" if math.isfinite(each.mean.low) else ""
         of = timing if each in found.comparisons else "of a movement's energy"
-        verdict = "" if each.shown else "no difference shown"
+        verdict = "" if each.shown else "not shown once all rows count together (Holm)"
         tiles.append(Tile(each.name, f"{percent(each.mean.value)} %", (within, of, verdict)))
     return tiles
 

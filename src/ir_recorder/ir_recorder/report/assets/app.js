@@ -78,7 +78,7 @@
   if (flows && matchMedia("(max-width: 700px)").matches) flows.open = true;
 
   exportButtons();
-  foldOnPhones(["year", "levers", "costs", "around"]);
+  foldOnPhones(["year", "levers", "tending"]);
   const wanted = /[#&]t=([\d.]+)/.exec(location.hash);
   timeline.seek(wanted ? Number(wanted[1]) : 0);
 })();

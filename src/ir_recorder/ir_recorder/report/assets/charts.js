@@ -423,10 +423,10 @@ class ClearanceChart extends TimeChart {
     this.bound = data.safetyDistance;
     this.parts = data.clearance.map((c) => ({ time: floats(c.time), low: floats(c.low), label: c.label }));
     this.load = data.lanes.find((lane) => lane.label === "load");
-    this.most = 0.3;
+    this.most = 0.1;
     for (const part of this.parts) for (const d of part.low) this.most = Math.max(this.most, d);
     this.most = Math.min(this.most, 0.8);
-    this.top = 8;
+    this.top = 22; /* names of contacts stand above the curves */
   }
   draw() {
     const g = this.begin();

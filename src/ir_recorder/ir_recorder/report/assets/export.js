@@ -130,7 +130,6 @@ function exportButtons() {
 /* On a telephone: what comes after the answer opens when its heading is chosen; curves and pictures stay. Paper has what a desk has. */
 function foldOnPhones(kept) {
   if (!matchMedia("(max-width: 700px)").matches) return;
-  for (const part of document.querySelectorAll("main > details.paper[open]")) part.open = false;
   for (const section of document.querySelectorAll("main > section[id]")) {
     const head = section.querySelector(":scope > h2");
     if (!head || kept.includes(section.id) || section.querySelector("canvas")) continue;
