@@ -74,7 +74,9 @@ def bundled_robots() -> tuple[str, ...]:
 
 @cache
 def load_robot(name: str = "kr210_r2700_extra") -> RobotModel:
-    """Return a bundled robot; the same object for the same name."""
+    """Return a bundled robot; the same object for the same name. Raises UnknownNameError for
+    another name.
+    """
     if name not in bundled_robots():
         raise UnknownNameError("robot", name, bundled_robots())
     path = _DATA / "robots" / f"{name}.yaml"
@@ -83,7 +85,9 @@ def load_robot(name: str = "kr210_r2700_extra") -> RobotModel:
 
 
 def robot_named(name_or_path: str) -> RobotModel:
-    """Return a bundled robot by its name, or the robot of a file by its path."""
+    """Return a bundled robot by its name, or the robot of a file by its path. Raises RobotFileError
+    for what is neither.
+    """
     if not is_path(name_or_path):
         return load_robot(name_or_path)
     try:
@@ -119,7 +123,9 @@ def load_power_parameters(
 
 
 def read_power_parameters(name_or_path: str) -> str:
-    """Return the text of a file of power parameters, not yet understood."""
+    """Return the text of a file of power parameters, not yet understood. Raises UnknownNameError
+    where there is none.
+    """
     if not is_path(name_or_path):
         raise UnknownNameError(
             "power parameters", name_or_path, (DATA_SHEET, "the path of a .yaml file")
@@ -186,7 +192,8 @@ def load_cell(name_or_path: str | Path) -> Cell:
     robots that of one of them, with its name behind: "two_robots@left".
 
     A text with a folder or with the ending .yaml or .yml is a path. Only regular files of at most
-    CELL_BYTES_MAX are read; their meshes come from their own folder.
+    CELL_BYTES_MAX are read; their meshes come from their own folder. Raises UnknownNameError for a
+    name that is none, CellFileError for a file with mistakes.
     """
     name = os.fspath(name_or_path)
     if isinstance(name_or_path, str) and name in bundled_cells():

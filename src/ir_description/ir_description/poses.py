@@ -85,8 +85,8 @@ def abc_from_rotation(rotation: FloatArray) -> FloatArray:
 
 
 def rotation_from_quaternion(xyzw: ArrayLike) -> FloatArray:
-    """Return the rotation (3, 3) of a quaternion x, y, z, w; small errors of length are
-    normalised.
+    """Return the rotation (3, 3) of a quaternion x, y, z, w; small errors of length are normalised.
+    Raises InvalidValueError for larger ones.
     """
     q = frozen(xyzw, (4,), "quaternion")
     length = portable.norm(q)
@@ -99,7 +99,9 @@ def rotation_from_quaternion(xyzw: ArrayLike) -> FloatArray:
 
 
 def rotation_from_matrix(rows: ArrayLike) -> FloatArray:
-    """Return rows (3, 3) as a rotation; errors of a few written digits are removed."""
+    """Return rows (3, 3) as a rotation; errors of a few written digits are removed. Raises
+    InvalidValueError for what is no rotation.
+    """
     R = frozen(rows, (3, 3), "rotation")
     error = float(np.abs(R @ R.T - np.eye(3)).max())
     if error > MATRIX_TOLERANCE or np.linalg.det(R) < 0.0:

@@ -174,7 +174,8 @@ class CollisionModel:
         """Whether all distances exceed their threshold everywhere on the straight segments q0 (N,
         n) to q1 (N, n).
 
-        A FREE verdict is a proof: rounding is counted. See reference.certify for the bound.
+        A FREE verdict is a proof: rounding is counted. See reference.certify for the bound. Raises
+        KernelError for shapes that do not fit.
         """
         start = self.chain.checked(q0, "q0")
         goal = self.chain.checked(q1, "q1")
@@ -190,7 +191,7 @@ class CollisionModel:
         segment [s].
 
         coefficients (S, n, K), lowest power first (quintics: K = 6); durations (S,) [s], not
-        negative.
+        negative. Raises KernelError for durations that are not above 0.
         """
         c = data.array(coefficients, "coefficients", (None, self.chain.n, None))
         span = data.array(durations, "durations", (len(c),))

@@ -121,7 +121,7 @@ def pose(value: ArrayLike, name: str) -> FloatArray:
 
 
 def poses(value: ArrayLike, name: str) -> FloatArray:
-    """(N, 4, 4) rigid transforms."""
+    """(N, 4, 4) rigid transforms. Raises KernelError for what is none."""
     result = array(value, name, (None, 4, 4))
     rotation = result[:, :3, :3]
     deviation = np.abs(portable.matmul(rotation, rotation.transpose(0, 2, 1)) - np.eye(3)).max(

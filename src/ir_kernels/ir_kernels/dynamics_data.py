@@ -210,7 +210,8 @@ def lump(
 ) -> tuple[float, FloatArray, FloatArray]:
     """Mass, centre of mass (3,) and inertia (3, 3) about it of a link with loads bolted on.
 
-    com (3,) and inertia (3, 3) are the link's own; parallel axis theorem.
+    com (3,) and inertia (3, 3) are the link's own; parallel axis theorem. Raises KernelError for a
+    load whose mass is negative or not finite.
     """
     masses = [float(mass), *(float(load.mass) for load in loads)]
     centres = [np.asarray(com, float), *(np.asarray(load.com, float) for load in loads)]

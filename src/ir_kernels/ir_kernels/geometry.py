@@ -181,7 +181,9 @@ class Geometry:
 
 
 def capsules(items: Sequence[CapsuleLike], n: int) -> Capsules:
-    """The capsules as arrays, checked against a chain of n joints."""
+    """The capsules as arrays, checked against a chain of n joints. Raises KernelError for a link
+    that the chain has not, and for a radius or an end that makes no sense.
+    """
     names = data.unique_names(items, "capsules")
     for item in items:
         label = f"capsule {item.name!r}"

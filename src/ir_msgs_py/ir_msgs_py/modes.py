@@ -100,7 +100,8 @@ def drive_bus_up(name: str) -> bool:
 
 def modes_of(power_mode: str) -> tuple[Mode, ...]:
     """The modes of a pause, one after the other: "STAND_ON_BRAKES>BUS_POWER_OFF" goes deeper as
-    soon as it can; none for "" and for standing on motors.
+    soon as it can; none for "" and for standing on motors. Raises InvalidValueError for an unknown
+    mode and for one that is not deeper than the one before.
     """
     names = power_mode.split(DEEPER) if power_mode else []
     for name in names:

@@ -50,7 +50,9 @@ class PlcInputs:
         object.__setattr__(self, "operating_mode", OperatingMode(self.operating_mode))
 
     def with_bit(self, name: str, value: bool) -> PlcInputs:
-        """Change one bit, or the operating mode by its name ("T1", only with True)."""
+        """Change one bit, or the operating mode by its name ("T1", only with True). Raises
+        InvalidValueError for a name that is none.
+        """
         one_of(name, PLC_INPUT_NAMES, "PLC input")
         if name not in OperatingMode.__members__:
             changes: dict[str, Any] = {name: bool(value)}
@@ -115,7 +117,9 @@ class Signal:
 
     @classmethod
     def parse(cls, text: str) -> Signal:
-        """Read what a program waits for or sets: "name" or "name=1", "name=0" or "not name"."""
+        """Read what a program waits for or sets: "name" or "name=1", "name=0" or "not name". Raises
+        InvalidValueError for another level.
+        """
         if text.startswith("not "):
             return cls(text[4:].strip(), False)
         name, separator, level = text.partition("=")

@@ -131,7 +131,9 @@ class JointTrajectory:
         velocities: ArrayLike | None = None,
         accelerations: ArrayLike | None = None,
     ) -> JointTrajectory:
-        """Round times (N,) [s] to nanoseconds; the rest as in the class."""
+        """Round times (N,) [s] to nanoseconds; the rest as in the class. Raises TrajectoryError for
+        times that are no finite row.
+        """
         seconds = np.asarray(times, dtype=np.float64)
         if seconds.ndim != 1:
             raise TrajectoryError(f"times have shape {seconds.shape}: they must be (N,)")
@@ -184,7 +186,8 @@ class JointTrajectory:
         """Motion at times t (M,) from start [s]; the robot rests before the first point and after
         the last.
 
-        At a point that two segments share the later one counts.
+        At a point that two segments share the later one counts. Raises TrajectoryError for times
+        that are not finite.
         """
         instants = np.asarray(t, dtype=np.float64)
         if instants.ndim != 1 or not np.isfinite(instants).all():

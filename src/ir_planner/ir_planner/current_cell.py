@@ -135,7 +135,7 @@ class CurrentCell:
         self, name: str, pose: FloatArray | None, enabled: bool | None, state: str
     ) -> Cell:
         """Move a machine to a pose (4, 4), switch it on or off, or change its state (None, "":
-        unchanged).
+        unchanged). Raises RequestError for a machine, pose or state that the cell can't have.
         """
         with self._changing:
             cell = self.cell

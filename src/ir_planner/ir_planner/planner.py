@@ -373,7 +373,8 @@ class Planner:
 
         via: places that are passed in this order, without a stop where that is better: every joint
         within via_tolerance [rad], or the tcp within via_distance [m] above 0 and its orientation
-        within via_tolerance.
+        within via_tolerance. Raises RequestError for a request that makes no sense; that nothing is
+        found is a status.
         """
         options, note = self._checked(options_with(options, changes))
         scene = self.scene(options.load)
@@ -442,7 +443,8 @@ class Planner:
         **changes: Unpack[OptionFields],
     ) -> EscapePlan:
         """A slow way from a start (n,) that is too near to something, in it or beyond a limit, on
-        which nothing gets worse. station: its allowed contacts hold.
+        which nothing gets worse. station: its allowed contacts hold. Raises RequestError for a
+        start that is a pose.
         """
         options, note = checked_options(options_with(options, changes))
         leaning_freely_only(options, "a way out")

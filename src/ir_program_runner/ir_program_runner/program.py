@@ -109,7 +109,9 @@ def station_of(movement: PlannedMovement) -> str:
 
 
 def load_after(movement: PlannedMovement) -> str:
-    """Return the load text when the step has ended; "" where the step leaves it open."""
+    """Return the load text when the step has ended; "" where the step leaves it open. Raises
+    InvalidValueError where it attaches what is there or detaches what is not.
+    """
     if not (movement.attach or movement.detach):
         return movement.load
     if not movement.load:

@@ -160,7 +160,7 @@ class RequestOutcome:
 
 
 def need(outcome: RequestOutcome) -> RequestOutcome:
-    """Return the outcome, or end the step with its status."""
+    """Return the outcome, or end the step with its status. Raises StepFailedError for that."""
     if not outcome.status.ok:
         raise StepFailedError(outcome.status)
     return outcome

@@ -102,7 +102,9 @@ def read_study(path: str | Path) -> Study:
 
 
 def study_of(content: str, kind: str = "", placed: Placed = str) -> Study:
-    """The study that a text asks for. kind: which it must be, "": what its format says."""
+    """The study that a text asks for. kind: which it must be, "": what its format says. Raises
+    SettingsError for another kind.
+    """
     kind = kind or kind_of(content)
     if kind not in KINDS:
         raise SettingsError(unknown_name("kind", kind, KINDS))

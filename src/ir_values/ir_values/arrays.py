@@ -38,8 +38,8 @@ def finite(value: float, name: str, unit: str = "") -> float:
 
 
 def not_nan(value: float, name: str, unit: str = "") -> float:
-    """Return the value as a float; infinities stay (no pair of bodies: the clearance is
-    infinite).
+    """Return the value as a float; infinities stay (no pair of bodies: the clearance is infinite).
+    Raises InvalidValueError for nan.
     """
     number = as_float(value, name, unit)
     if math.isnan(number):
@@ -66,7 +66,7 @@ def in_fraction(value: float, name: str) -> float:
 
 
 def one_of(value: str, known: Collection[str], name: str) -> str:
-    """Return the choice; an unknown one lists the known."""
+    """Return the choice; an unknown one lists the known. Raises InvalidValueError for that."""
     if not isinstance(value, str) or value not in known:
         raise InvalidValueError(f'{name} is "{str(value)[:80]}": known are {", ".join(known)}')
     return value
@@ -83,7 +83,8 @@ def as_array(value: ArrayLike, name: str) -> FloatArray:
 def read_only(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> FloatArray:
     """Return a read-only float64 copy of the array; (None, 3) stands for any (N, 3).
 
-    A copy that is already read-only float64 and owns its data is passed on as it is.
+    A copy that is already read-only float64 and owns its data is passed on as it is. Raises
+    InvalidValueError for another shape and for what is not finite.
     """
     array = as_array(value, name)
     if array.ndim != len(shape) or any(
@@ -133,7 +134,7 @@ ROTATION_TOLERANCE = 1e-9
 
 def frozen(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> FloatArray:
     """Return a read-only float64 copy of that shape, (None, 3) for (N, 3), refusing NaN and
-    infinity.
+    infinity. Raises InvalidValueError for another.
     """
     array = np.array(as_array(value, name))
     if array.shape != shape and (
@@ -212,7 +213,9 @@ def frozen_inertia(value: ArrayLike, name: str) -> FloatArray:
 def in_range(
     value: float, low: float, high: float, unit: str, name: str, *, open_low: bool = False
 ) -> float:
-    """Return value as a float, refusing NaN and what lies outside [low, high] (or (low, high])."""
+    """Return value as a float, refusing NaN and what lies outside [low, high] (or (low, high]).
+    Raises InvalidValueError for these.
+    """
     number = as_float(value, name, unit)
     if not (low < number <= high if open_low else low <= number <= high):
         left = "(" if open_low else "["

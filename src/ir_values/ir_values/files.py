@@ -24,7 +24,7 @@ _HEAD = 64  # bytes, in which every second one is zero where Latin letters stand
 
 def read_regular_file(path: Path, limit: int) -> bytes:
     """Return the content of a regular file of at most `limit` bytes; never blocks on a FIFO or
-    device.
+    device. Raises InvalidValueError for others.
     """
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
@@ -79,7 +79,7 @@ def is_path(text: str) -> bool:
 
 def inside(folder: Path | None, name: str) -> Path:
     """The path of a YAML file that another file names, relative to that file's folder; nothing
-    leads out.
+    leads out. Raises InvalidValueError for a path that leads elsewhere.
     """
     if folder is None:
         raise InvalidValueError(

@@ -420,7 +420,9 @@ class Cell:
         return _named(stops, "station", name)
 
     def posture(self, name: str) -> FloatArray:
-        """Return the joint values (n,) [rad] of "home" or "park"."""
+        """Return the joint values (n,) [rad] of "home" or "park". Raises UnknownNameError for
+        another one.
+        """
         if name not in ("home", "park"):
             raise UnknownNameError("posture", name, ("home", "park"))
         return self.machine_home if name == "home" else self.park

@@ -65,7 +65,7 @@ def zone_around(kind: ZoneKind, bodies: Iterable[Body], stations: Iterable[Stati
     """Return the box of a machine's bodies and its stations' tcps along the axes of its frame.
 
     What stands on a table belongs to it, up to the height of the station above it. Planes don't
-    count.
+    count. Raises InvalidValueError where there is nothing to enclose.
     """
     bounds = [body.bounds() for body in bodies if body.kind != "plane"]
     if not bounds:

@@ -50,7 +50,7 @@ class RobotCells:
         return dict(zip(self.robots, self.cells, strict=True))
 
     def of_robot(self, name: str) -> Cell:
-        """The cell as one of the robots sees it."""
+        """The cell as one of the robots sees it. Raises UnknownNameError for none of them."""
         if name not in self.robots:
             raise UnknownNameError("robot", name, self.robots)
         return self.cells[self.robots.index(name)]

@@ -95,7 +95,9 @@ class CloudReader:
         self._folder = folder
 
     def read(self, table: Table) -> CloudBoxes:
-        """Return the boxes of the cloud that an entry describes."""
+        """Return the boxes of the cloud that an entry describes. Raises InvalidValueError for an
+        entry that makes no sense or a file that may not be read.
+        """
         crop = None
         if "crop" in table:
             rows = table["crop"].rows(3, -SIZE_MAX, SIZE_MAX, "m", count=(2, 2))

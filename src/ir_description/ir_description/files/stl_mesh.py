@@ -36,7 +36,9 @@ _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
 
 
 def mesh_path(folder: Path, name: str, suffixes: tuple[str, ...] = (".stl",)) -> Path:
-    """Return the path of a mesh inside the folder of its cell file; nothing leads out of it."""
+    """Return the path of a mesh inside the folder of its cell file; nothing leads out of it. Raises
+    InvalidValueError for another place or ending.
+    """
     path = Path(name)
     refuse_surfaces(path)
     if (

@@ -163,7 +163,9 @@ class PowerData:
         return self.has_table or self.modes[0].controller_watts > 0.0
 
     def mode(self, name: str) -> ControllerMode:
-        """Return the mode of that name."""
+        """Return the mode of that name. Raises UnknownNameError for one that the controller has
+        not.
+        """
         for mode in self.modes:
             if mode.name == name:
                 return mode
@@ -195,7 +197,9 @@ class PowerData:
         return f"{said}, outside of them: {beyond}, their nearest values count" if beyond else said
 
     def measured(self, payload: float, mode: str) -> float:
-        """Return Table II's watts for a payload of 0 or 155 kg in a mode."""
+        """Return Table II's watts for a payload of 0 or 155 kg in a mode. Raises UnknownNameError
+        where the table has no such row.
+        """
         for row in self.table_2:
             if row.payload == payload and row.mode == mode:
                 return row.watts

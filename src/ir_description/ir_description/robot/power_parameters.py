@@ -276,7 +276,7 @@ class PowerParameters:
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     def index(self, name: str) -> int:
-        """Place of a parameter in the vector."""
+        """Place of a parameter in the vector. Raises UnknownNameError for none of them."""
         if name not in self.names:
             raise UnknownNameError("power parameter", name, self.names)
         return self.names.index(name)

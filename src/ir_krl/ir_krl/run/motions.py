@@ -290,7 +290,7 @@ class Motions:
         )
 
     def target(self, tree: SyntaxTree, relative: bool, in_tool: bool) -> Target:
-        """Where an expression leads to."""
+        """Where an expression leads to. Raises KrlRunError for what is no position."""
         place = place_of(tree, self._expressions.file)
         if tree.data == "access" and str(tree.children[0]) in STANDING:
             return self.here(str(tree.children[0]), place)

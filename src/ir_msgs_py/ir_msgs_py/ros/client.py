@@ -494,7 +494,9 @@ class Client:
         )
 
     def next_message(self, topic: str, message_type: Any, timeout: float | None = None) -> Any:
-        """Return the next message of a topic, or the newest one where its publishers keep some."""
+        """Return the next message of a topic, or the newest one where its publishers keep some.
+        Raises CallTimedOutError where none comes.
+        """
         limit = self.timeout if timeout is None else timeout
         received: list[Any] = []
         self._executor.wait_until(lambda: bool(self.graph.publishers(topic)), limit)

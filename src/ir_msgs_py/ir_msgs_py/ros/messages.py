@@ -29,7 +29,7 @@ _KINDS = ("msg", "srv", "action")
 
 def interface_type(name: str, kind: str) -> Any:
     """Return the class of a "msg", "srv" or "action"; "ir_msgs/SetCell" is enough where the kind is
-    known.
+    known. Raises UnknownTypeError for no such name.
     """
     parts = name.split("/")
     package = parts[0]
@@ -51,7 +51,9 @@ def type_name(interface: Any) -> str:
 
 
 def owner_of(part: Any, suffix: str, kind: str) -> Any:
-    """Return the service or action type that a Request or Goal instance belongs to."""
+    """Return the service or action type that a Request or Goal instance belongs to. Raises
+    UnknownTypeError for another class.
+    """
     cls = type(part)
     if not cls.__name__.endswith(f"_{suffix}"):
         raise UnknownTypeError(f"{cls.__name__} is not the {suffix} of a {kind} type")

@@ -160,7 +160,9 @@ def controller_timers_to_msg(timers: ControllerTimers) -> ControllerTimersMsg:
 
 
 def controller_timers_from_msg(msg: ControllerTimersMsg) -> ControllerTimers:
-    """Timers of a controller; they must be those of every mode to rest in."""
+    """Timers of a controller; they must be those of every mode to rest in. Raises InvalidValueError
+    for others.
+    """
     lists = (msg.modes, msg.enter, msg.stay, msg.leave)
     if len({len(values) for values in lists}) != 1:
         lengths = ", ".join(str(len(values)) for values in lists)
@@ -192,7 +194,7 @@ def carried_load_to_msg(load: CarriedLoad) -> CarriedLoadMsg:
 
 
 def carried_load_from_msg(msg: CarriedLoadMsg) -> CarriedLoad:
-    """What the robot carries."""
+    """What the robot carries. Raises InvalidValueError for figures that no load has."""
     if len(msg.inertia) != 6:
         raise InvalidValueError(f"inertia has {len(msg.inertia)} values: it must have 6")
     inertia = np.zeros((3, 3))

@@ -135,7 +135,9 @@ class BackgroundExecutor:
         return node
 
     def run(self, function: Callable[[], T], timeout: float = 60.0) -> T:
-        """Call the function on the spinning thread and return what it returns."""
+        """Call the function on the spinning thread and return what it returns. Raises TimeoutError
+        where that thread does not take it up.
+        """
         if threading.current_thread() is self._thread:
             return function()
         task = self._executor.create_task(function)

@@ -141,7 +141,9 @@ def curve_of(
 def followed(
     poses: FloatArray, s: FloatArray, chain: ConfigurationChain, scene: PlanningScene
 ) -> FloatArray:
-    """Configurations (M, n) at poses (M, 4, 4) at s (M,), each the nearest to the chain there."""
+    """Configurations (M, n) at poses (M, 4, 4) at s (M,), each the nearest to the chain there.
+    Raises PathRefusedError where the path leaves the reach or an axis its range.
+    """
     near = np.column_stack([np.interp(s, chain.s, column) for column in chain.q.T])
     found = scene.inverse_kinematics_once.solve(poses)
     every = turned_towards(found.q, near[found.pose_index], scene)

@@ -187,7 +187,7 @@ def check_at_rest(
 def state_of(msg: Any, cell: Cell, code: StatusCode, at_rest: str = "") -> FloatArray | None:
     """Joint values (n,) rad of a JointState, None where it is empty. Velocities must be finite
     where there are any, and those of a state that `at_rest` names ("start") about 0; efforts are
-    not looked at.
+    not looked at. Raises RequestError for joints that are not the robot's.
     """
     if not configuration_given(msg) and not msg.velocity:
         return None
@@ -320,7 +320,9 @@ def options_of(msg: Any, draw_seed: Any) -> PlanOptions:
 
 
 def trajectory_of(request: Any, planner: Planner) -> JointTrajectory:
-    """Trajectory of a request: by id or by its points."""
+    """Trajectory of a request: by id or by its points. Raises RequestError for both, neither, or
+    points that make no sense.
+    """
     given = trajectory_given(request.trajectory)
     if bool(request.trajectory_id) == given:
         which = "both are" if given else "neither is"
@@ -337,7 +339,9 @@ def trajectory_of(request: Any, planner: Planner) -> JointTrajectory:
 
 
 def reference_of(msg: Any, cell: Cell) -> Reference:
-    """Points to pass; where all times are zero they are missing."""
+    """Points to pass; where all times are zero they are missing. Raises RequestError for points
+    that make no sense.
+    """
     if len(msg.points) > POINTS_MAX:
         raise RequestError(
             StatusCode.INVALID_MOTION_PLAN,

@@ -295,7 +295,7 @@ _MOST_PATH_STOPS = 64
 
 def path_nodes(arriving: Context, leaving: PlanningScene) -> tuple[list[StopNode], Status]:
     """Certified movements along the context's path, each from and to where nothing may be touched;
-    or none and why.
+    or none and why. Raises RequestError where the path is refused.
     """
     name = arriving.station
     path = arriving.scene.cell.path(name)

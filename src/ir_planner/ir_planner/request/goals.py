@@ -48,7 +48,9 @@ def one_goal(
     cell: Cell,
     forms: tuple[str, ...] = ("goal", "goal_state", "goal_pose"),
 ) -> Goal:
-    """The goal that a request gives in exactly one form: text, configuration (n,), pose (4, 4)."""
+    """The goal that a request gives in exactly one form: text, configuration (n,), pose (4, 4).
+    Raises RequestError for none or several.
+    """
     filled = {
         "goal": bool(text),
         "goal_state": configuration is not None,

@@ -45,7 +45,7 @@ def bounded(value: float, low: float, high: float, name: str, unit: str = "") ->
 
 
 def chosen(value: str, known: tuple[str, ...], name: str) -> str:
-    """The choice; an unknown one lists the known."""
+    """The choice; an unknown one lists the known. Raises RequestError for that."""
     if value not in known:
         listed = ", ".join(word or '""' for word in known)
         raise RequestError(

@@ -212,7 +212,7 @@ def _end_retracted(path: FloatArray, problem: Exit) -> FloatArray:
 
 
 def known_method(method: str) -> str:
-    """The method of a request; an unknown one lists the known."""
+    """The method of a request; an unknown one lists the known. Raises RequestError for that."""
     if method not in ("", *EXIT_SEARCHES):
         raise RequestError(
             StatusCode.INVALID_GOAL_CONSTRAINTS,

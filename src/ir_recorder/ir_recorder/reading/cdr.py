@@ -89,7 +89,7 @@ class Columns:
         return out
 
     def integers(self, path: str) -> IntArray:
-        """A whole-number field as (N,); 0 where it is missing."""
+        """A whole-number field as (N,); 0 where it is missing. Raises ReadError for another one."""
         out = np.zeros(self.count, dtype=np.int64)
         for rows, block, layout in self._groups:
             leaf = layout.leaves.get(path)

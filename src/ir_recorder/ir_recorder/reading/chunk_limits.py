@@ -53,7 +53,9 @@ class ChunkReader:
         self._cheap = 0
 
     def records(self, chunk: Chunk) -> list[McapRecord]:
-        """What is in the chunk; its check sum is compared."""
+        """What is in the chunk; its check sum is compared. Raises ReadError for a damaged one and
+        for one beyond the bounds.
+        """
         if chunk.uncompressed_size > self._limits.chunk:
             claimed = _mib(chunk.uncompressed_size)
             most = _mib(self._limits.chunk)
@@ -83,7 +85,9 @@ class ChunkReader:
         return records
 
     def describe(self, record: McapRecord) -> None:
-        """Counts what isn't a message: schemas, channels, and facts with their maps of texts."""
+        """Counts what isn't a message: schemas, channels, and facts with their maps of texts.
+        Raises TooLargeError beyond their bounds.
+        """
         if isinstance(record, Channel):
             self._channels += 1
             size = sum(len(key) + len(value) for key, value in record.metadata.items())
@@ -100,7 +104,7 @@ class ChunkReader:
             )
 
     def count(self, size: int) -> None:
-        """Adds to the memory in use."""
+        """Adds to the memory in use. Raises TooLargeError beyond its bound."""
         self._used += size
         if self._used > self._limits.total:
             raise TooLargeError(

@@ -251,8 +251,8 @@ class BulletArm:
             self._call(self._bullet.resetJointState, self._body, joint, position, speed)
 
     def advance(self, torque: Sequence[float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Make a step with these torques on the links: position (n,), and speed (n,) over the
-        step.
+        """Make a step with these torques on the links: position (n,), and speed (n,) over the step.
+        Raises BackendError where the physics diverges.
         """
         bullet = self._bullet
         body = self._body

@@ -260,7 +260,9 @@ class ControllerTables:
         return input_registers(self._readout())
 
     def write_coils(self, start: int, levels: Sequence[bool]) -> None:
-        """Set levels; any write of the heartbeat's coil is a heartbeat."""
+        """Set levels; any write of the heartbeat's coil is a heartbeat. Raises ModbusRefusedError
+        for an address that has none.
+        """
         if start + len(levels) > len(COILS):
             raise ModbusRefusedError(ExceptionCode.ADDRESS)
         named = {COILS[k]: level for k, level in enumerate(levels, start=start)}
@@ -274,7 +276,9 @@ class ControllerTables:
             self._controller.heartbeat(self._watchdog)
 
     def write_registers(self, start: int, values: Sequence[int]) -> None:
-        """Turn the mode switch, start or end a pause, or both at once."""
+        """Turn the mode switch, start or end a pause, or both at once. Raises ModbusRefusedError
+        for an address that has none and for what the controller refuses.
+        """
         if start + len(values) > HOLDING_REGISTERS:
             raise ModbusRefusedError(ExceptionCode.ADDRESS)
         self._readout()

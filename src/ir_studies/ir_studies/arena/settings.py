@@ -182,7 +182,7 @@ def settings_text(settings: ArenaSettings, folder: Path | None = None) -> str:
 
 def arena_settings(content: str, placed: Placed) -> ArenaSettings:
     """The settings of a text. placed: where cells are; files are known by their whole paths,
-    however and from wherever they are named.
+    however and from wherever they are named. Raises SettingsError for settings that make no sense.
     """
     values = settings_values(content, FORMAT, [field.name for field in fields(ArenaSettings)])
     if "cells" not in values:

@@ -235,7 +235,9 @@ def read_layout(path: str | Path) -> LayoutSettings:
 
 
 def layout_settings(content: str, placed: Placed) -> LayoutSettings:
-    """The settings of a text. placed: where a cell is."""
+    """The settings of a text. placed: where a cell is. Raises SettingsError for settings that make
+    no sense.
+    """
     values = settings_values(content, FORMAT, [each.name for each in fields(LayoutSettings)])
     if not isinstance(values.get("cell"), str):
         raise SettingsError("cell is missing: the name of a bundled cell, or a file")

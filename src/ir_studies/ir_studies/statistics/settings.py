@@ -101,7 +101,9 @@ _REAL = (("safety_distance", 0.0, 1.0), ("hang_after", 1.0, 86_400.0))
 
 
 def statistics_settings(content: str, placed: Placed) -> StatisticsSettings:
-    """The settings of a text. placed: where cell and plant are."""
+    """The settings of a text. placed: where cell and plant are. Raises SettingsError for settings
+    that make no sense.
+    """
     values = settings_values(content, FORMAT, [field.name for field in fields(StatisticsSettings)])
     if "cell" not in values:
         raise SettingsError("cell is missing: the name of a bundled cell, or a file")
