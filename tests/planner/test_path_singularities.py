@@ -11,6 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from ir_msgs_py.cartesian import CartesianPath, CartesianSegment
+from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner
 from ir_planner.scene import PlanningScene
 from ir_values.arrays import FloatArray
@@ -63,6 +64,23 @@ def beside_a_singularity(seed: int, scene: PlanningScene) -> CartesianPath:
             speed = float(10.0 ** rng.uniform(-2.0, 0.0))
             segments = (CartesianSegment("line", (ends[1],)),)
             return CartesianPath(ends[0], segments, speed, speed_tolerance=1.0)
+
+
+def seam(seed: int) -> CartesianPath:
+    """An upright line of 0.2 to 0.45 m along which axes 4 and 6 come to one line, but for 10 um to
+    5 mm: both turn half a turn and back within millimetres.
+    """
+    rng = np.random.default_rng(seed)
+    pose = np.eye(4)
+    pose[:3, 3] = rng.uniform((1.9, -1.0, 1.3), (2.25, 1.0, 1.7))
+    pose[1, 3] = 10.0 ** rng.uniform(-5.0, -2.3) * rng.choice([-1, 1])
+    end = pose.copy()
+    end[2, 3] += rng.uniform(0.2, 0.45)
+    around = np.eye(4)
+    around[:3, :3] = Rotation.from_euler("z", rng.uniform(-2.5, 2.5)).as_matrix()
+    segments = (CartesianSegment("line", (around @ end,)),)
+    speed = float(10.0 ** rng.uniform(-2.0, 0.0))
+    return CartesianPath(around @ pose, segments, speed, speed_tolerance=1.0)
 
 
 def stairs(seed: int) -> CartesianPath:
@@ -146,6 +164,34 @@ def test_what_can_be_followed_beside_a_singularity_is_driven(
         assert plan.status.ok or not followed(path, scene), (seed, plan.status.message)
         assert plan.report.certified == plan.status.ok
         assert plan.tool_error <= 1e-4
+
+
+@pytest.mark.parametrize(
+    "seeds", [range(6, 10), pytest.param(range(60), marks=pytest.mark.long)], ids=str
+)
+def test_a_seam_beside_the_wrist_takes_no_more_than_its_axes_need(
+    planner: Planner, seeds: range
+) -> None:
+    scene = planner.scene()
+    for seed in seeds:
+        path = seam(seed)
+        plan = planner.plan_cartesian(path)
+        assert plan.status.ok or not followed(path, scene), (seed, plan.status.message)
+        if plan.trajectory is not None:
+            least = by_speeds_alone(plan.trajectory, path.tool_speed, scene)
+            assert plan.report.duration <= _LONGER * least, seed
+
+
+_LONGER = 8.0  # 4.8 at most in 60 seams
+
+
+def by_speeds_alone(trajectory: JointTrajectory, speed: float, scene: PlanningScene) -> float:
+    """Seconds along a trajectory's path if nothing but the speeds of tool and axes bound it."""
+    q = trajectory.sample(np.linspace(0.0, trajectory.duration, 20001)).q
+    places = scene.chain.tcp_poses(q)[:, :3, 3]
+    tool = np.linalg.norm(np.diff(places, axis=0), axis=1) / speed
+    axes = (np.abs(np.diff(q, axis=0)) / scene.limits.velocity).max(axis=1)
+    return float(np.maximum(tool, axes).sum())
 
 
 @pytest.mark.parametrize(

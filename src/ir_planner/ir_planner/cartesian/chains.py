@@ -309,7 +309,8 @@ def chains(
     steps = difference(q[before], q[after], turning)
     joules = _edge_joules(q[before], steps, seconds, scene)
     jumps = np.flatnonzero(np.abs(steps).max(axis=1) > JUMP)
-    if len(jumps):  # only where samples could be closer
+    if len(jumps):  # only where samples could be closer; any jump costs more than none
+        joules = np.minimum(joules, _A_JUMP / len(layers.s))
         joules[jumps] = _A_JUMP * (1.0 + _strays(q[before[jumps]], steps[jumps], scene))
     apart = _SAME if len(np.unique(layers.angle)) == 1 else _APART
     if by_start:  # the same edges from the end

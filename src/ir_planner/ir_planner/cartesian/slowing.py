@@ -25,7 +25,8 @@ _DEGREE = 4  # jerk is continuous
 _SPACING_S = 0.02  # s of the motion between control values
 _FEWEST = 40
 _MOST = 4000
-_CHANGE = 0.5  # of the rate at which the limits let a speed change
+_CHANGE = 0.5  # of the rate at which the limits let a speed change, and at most
+_FASTEST = 20.0  # 1/s
 _FITS = 12  # of control values to the time that the motion takes
 _ROUNDS = 8  # of more time with the same ones
 _AROUND = 3  # control values that get more time together
@@ -86,9 +87,9 @@ def _slowed(
     """The stroke with so much more time that it keeps the limits at all samples, from a need (M,)
     of it at instants tau (M,) s of the law.
     """
-    change = _CHANGE * float((limits.acceleration / limits.velocity).min())
+    speeds = np.abs(replace(made, slowness=None).at(tau).qd)
     for _ in range(_FITS):
-        need = _changing(tau, np.maximum(need, 1.0), change)
+        need = _changing(tau, np.maximum(need, 1.0), speeds, limits)
         knots, control = _spline_of(tau, need)
         asked = np.union1d(tau, _between(knots))
         for _ in range(_ROUNDS):
@@ -103,15 +104,19 @@ def _slowed(
     raise refused(motion, limits, scene, 1.0)
 
 
-def _changing(tau: FloatArray, need: FloatArray, change: float) -> FloatArray:
-    """The need (M,) raised so that its logarithm changes by at most `change` 1/s in the time that
-    it makes.
+def _changing(
+    tau: FloatArray, need: FloatArray, speeds: FloatArray, limits: MotionLimits
+) -> FloatArray:
+    """The need (M,) raised so that its logarithm changes in the time that it makes no faster than a
+    share of the limits lets axes change their speeds, `speeds` (M, n) rad/s of the law.
     """
     for _ in range(4):
-        t = _times(tau, need)
         level = portable.log(need)
-        ahead = np.maximum.accumulate(level + change * t) - change * t
-        back = np.maximum.accumulate((level - change * t)[::-1])[::-1] + change * t
+        axes = np.maximum(speeds / need[:, None], 1e-9)
+        rates = np.minimum(limits.acceleration / axes, np.sqrt(limits.jerk / axes))
+        changed = _times(tau, need * np.minimum(_CHANGE * rates.min(axis=1), _FASTEST))
+        ahead = np.maximum.accumulate(level + changed) - changed
+        back = np.maximum.accumulate((level - changed)[::-1])[::-1] + changed
         need = portable.exp(np.maximum(ahead, back))
     return np.asarray(need)
 
