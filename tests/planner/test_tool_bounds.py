@@ -115,6 +115,31 @@ def test_no_point_exceeds_its_limit_and_a_looser_one_takes_no_longer(
         longer = plan.report.duration
 
 
+@pytest.mark.parametrize("cell", CELLS)
+def test_only_what_is_too_fast_for_the_tool_is_slowed(
+    planners: dict[str, Planner], cell: str
+) -> None:
+    """Beside the same movement without a bound, stretched until the judge finds the tool within."""
+    planner = planners[cell]
+    shares = []
+    for seed in range(6):
+        draw = np.random.default_rng([seed, 34])
+        goal = drawn_goal(planner, draw)
+        free = planner.plan_regional(goal=goal, objective="time")
+        fastest, hardest = judged(planner, free.trajectory)
+        share = draw.uniform(0.2, 0.6)
+        plan = planner.plan_regional(
+            goal=goal,
+            objective="time",
+            tool_speed=share * fastest,
+            tool_acceleration=share * share * hardest,
+        )
+        assert plan.report.certified
+        shares.append(plan.report.duration * share / free.report.duration)
+    assert max(shares) <= 1.001, shares
+    assert np.median(shares) <= 0.97, shares
+
+
 def drawn_trajectory(
     planner: Planner, draw: np.random.Generator, count: int, known: int
 ) -> JointTrajectory:

@@ -39,6 +39,7 @@ from ir_planner.regional.safeguards import (
     best_found,
     not_worse_than_baseline,
     over_free_steps,
+    slowed_where_fast,
     with_own_laws,
 )
 from ir_planner.request import Context, Goal, Journal, within_limits
@@ -250,7 +251,7 @@ def _cheapest(exploration: Exploration, context: Context) -> Answer | None:
     if not there and planner_id == "":
         best = not_worse_than_baseline(best, exploration.paths, context)
     if best is not None:
-        return best
+        return slowed_where_fast(best, context)
     if np.isfinite(shortest):
         check_requested(shortest, context)
     portfolio = Portfolio(exploration.space, Refinement(context))

@@ -22,9 +22,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ir_planner.checks import FreeSpace
+from ir_planner.checks import FreeSpace, ToolUse
 from ir_planner.errors import RequestError, TimingError
-from ir_planner.optimize import Portfolio, Refinement, path_of
+from ir_planner.optimize import QUICK_TIMING, Portfolio, Refinement, path_of, rescaled
 from ir_planner.optimize import optimised_near as near
 from ir_planner.regional.exploration import Path, Searches, improve
 from ir_planner.request import DURATION_MAX, Context
@@ -48,6 +48,7 @@ _DURATION_STEPS = 4
 _COARSELY = 0.99  # of a bound by a few durations: the best of all is little below it
 _HURRY = 100.0  # times the robot's own value of a second
 _NEAR = 1.03  # times the duration of the fastest: a descent gains less
+_AT_A_BOUND = 0.999  # of a bound of the tool's speed or acceleration: the movement was slowed to it
 _WORTH_PROVING = 1.01  # times the cost of the best: coarse costs are off by less
 DIRECT = "direct"  # the search that finds straight segments
 
@@ -287,6 +288,25 @@ def _cheaper(best: Answer | None, other: Answer | None) -> Answer | None:
     if best is None or other is None:
         return best or other
     return other if other[1].cost < best[1].cost else best
+
+
+def slowed_where_fast(answer: Answer, context: Context) -> Answer:
+    """An answer that is slow for its tool all along, or the movement along its path that is so only
+    where the tool would be too fast, if that costs less.
+    """
+    method, movement = answer
+    bounds = context.tool_bounds
+    if not bounds.asked or context.options.objective == "movement_cost":
+        return answer
+    if ToolUse(movement.trajectory, context.scene, bounds).longer.max() < _AT_A_BOUND:
+        return answer
+    with context.journal.stage("tool speed") as notes:
+        along = rescaled(movement, context, QUICK_TIMING)
+        if along is None or along.cost >= movement.cost:
+            notes.append("slower all along")
+            return answer
+        notes.append("slower where the tool would be too fast")
+        return method, along
 
 
 def over_free_steps(movement: Movement, space: FreeSpace) -> Movement:
