@@ -68,7 +68,9 @@ def best_along(asked: ToolPathRequest, layers: Layers) -> DrivenPath:
     reason: PathRefusedError | None = None
     for rate in _rates(asked.fastest):
         trial = replace(asked, rate=rate)
-        if best is not None and trial.least_duration >= best.movement.trajectory.duration:
+        if best is not None and (
+            asked.context.work.exhausted or trial.least_duration >= _duration(best)
+        ):
             break
         try:
             driven = _best_at(trial, layers)
