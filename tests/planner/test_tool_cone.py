@@ -214,6 +214,38 @@ def test_a_tilt_between_the_points_of_a_trajectory_is_found() -> None:
     assert Judge(planner).largest(given, axis, UP) <= wide.report.largest_tilt <= 0.8
 
 
+@pytest.mark.parametrize("cell", ["cnc_door", "deep_box", "kr6_bench"])
+@pytest.mark.parametrize("direction", ["exit", "entry"])
+def test_the_tool_leans_no_farther_out_of_a_machine_and_into_it(cell: str, direction: str) -> None:
+    """Wherever a service movement is found without a bound, for any of three drawn ones."""
+    planner = planner_in(cell)
+    judge = Judge(planner)
+    rng = np.random.default_rng(len(cell))
+    for station in planner.cell.stations:
+        free = planner.plan_service(station.name, direction=direction, max_candidates=1)
+        for most in np.radians(rng.uniform(2.0, 30.0, 3)) if free.status.ok else ():
+            plan = planner.plan_service(station.name, direction=direction, tilt_max=most)
+            assert plan.status.ok, plan.status.message
+            for candidate in plan.candidates:
+                assert candidate.report.certified
+                axis = judge.rotation(candidate.work).T @ UP
+                seen = judge.largest(candidate.trajectory, axis, UP)
+                assert seen <= min(most, candidate.report.largest_tilt) + TOLERANCE
+
+
+def test_a_tool_that_leans_too_far_at_a_station_is_refused() -> None:
+    planner = planner_in("cnc_door")
+    for direction, code in (
+        ("exit", StatusCode.START_STATE_VIOLATES_PATH_CONSTRAINTS),
+        ("entry", StatusCode.GOAL_VIOLATES_PATH_CONSTRAINTS),
+    ):
+        plan = planner.plan_service(
+            "cnc", direction=direction, tilt_max=0.1, tilt_axis=[1.0, 0.0, 0.0]
+        )
+        assert plan.status.code == code
+        assert "at cnc" in plan.status.message
+
+
 def test_a_program_keeps_the_tilt_that_its_cell_asks_for() -> None:
     text = cell_to_yaml(load_cell("kr6_bench"))
     step = "{station: place, dwell: 0.5"

@@ -31,9 +31,9 @@ class PlanOptions:
     robot's own. duration: wanted [s], 0 = free. velocity_scaling, acceleration_scaling in (0, 1].
     load: load text, "" = what is attached. include_points: put the points into the answer.
     tilt_max [rad]: by how much tilt_axis, (3,) in the frame of the tcp, may lean from
-    tilt_direction, (3,) in the cell, at every instant of a regional movement; -1: as it likes. ()
-    is the axis that points in the direction at the start, and the direction up. Both are brought
-    to length 1.
+    tilt_direction, (3,) in the cell, at every instant of a regional or service movement; -1: as it
+    likes. () is the axis that points in the direction at the start, and the direction up. Both are
+    brought to length 1.
     tool_speed [m/s], tool_acceleration [m/s^2]: the most that the tcp may have, 0 = as the axes
     allow; whole_tool: every point of tool and part instead.
     """

@@ -477,7 +477,6 @@ class Planner:
         options = options_with(options, changes)
         method = known_method(options.planner_id)
         options, note = checked_options(replace(options, planner_id=""))
-        leaning_freely_only(options, "a service movement")
         checked_request(direction, max_candidates)
         scene = self.scene(options.load)
         here = self._configuration(near, "near", StatusCode.INVALID_ROBOT_STATE)

@@ -116,8 +116,8 @@ class Exit:
         return Exit(
             interaction,
             WorkArea.of(scene, scene.station(context.station)),
-            FreeSpace.of(scene, margin, work, context.station),
-            FreeSpace.of(scene, margin, work),
+            FreeSpace.of(scene, margin, work, context.station, cone=context.cone),
+            FreeSpace.of(scene, margin, work, cone=context.cone),
             margin,
         )
 

@@ -17,7 +17,17 @@ from ir_description import Station
 from ir_kernels import portable
 from ir_msgs_py.report import PlanningInfo, ServiceCandidate, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
-from ir_planner.checks import CLOSEST, PATH, ZONES, Colour, FreeSpace, Shape, nearest_pair, too_near
+from ir_planner.checks import (
+    CLOSEST,
+    PATH,
+    ZONES,
+    Colour,
+    FreeSpace,
+    Shape,
+    leans,
+    nearest_pair,
+    too_near,
+)
 from ir_planner.configurations import free_configurations, no_configuration
 from ir_planner.errors import RequestError, TimingError
 from ir_planner.optimize import movement_over
@@ -166,10 +176,15 @@ def _search(
         return status, ()
     failed = Status(StatusCode.PLANNING_FAILED, "nothing was tried")
     for q in interaction:
-        problem = Exit.of(q, context)
+        upright = context.upright_from(q)
+        leaning = _leaning(q, request, upright)
+        if leaning is not None:
+            failed = leaning
+            continue
+        problem = Exit.of(q, upright)
         found = withdrawal(problem, request.max_candidates, method, searches, journal)
         with journal.stage("timing") as notes:
-            timed = [_timed(path, request, context) for path in found.paths]
+            timed = [_timed(path, request, upright) for path in found.paths]
             certified = [movement for movement in timed if movement is not None]
             notes.append(f"{len(certified)} of {len(timed)} certified")
         if certified:
@@ -183,6 +198,20 @@ def _search(
         if journal.work.exhausted:
             break
     return failed, ()
+
+
+def _leaning(q: FloatArray, request: ServiceRequest, context: Context) -> Status | None:
+    """The status where the tool leans too far at the station (n,); None where it doesn't."""
+    cone = context.cone
+    if cone is None or cone.holds(q[None])[0]:
+        return None
+    entering = request.direction == ENTRY
+    code = (
+        StatusCode.GOAL_VIOLATES_PATH_CONSTRAINTS
+        if entering
+        else StatusCode.START_STATE_VIOLATES_PATH_CONSTRAINTS
+    )
+    return Status(code, leans(float(cone.tilts(q[None])[0]), cone, f"at {request.station.name}"))
 
 
 def _timed(

@@ -328,9 +328,16 @@ class _Walker:
             owner = owner[~out]
         if len(q) == 0:
             return q, owner, np.ones(count, dtype=bool)
+        cone = self.inside.cone
+        if cone is not None:
+            q = cone.brought_in(q, low, high, self.inside.scale)
         near = self.scene.collision.min_distance(q, self.inside.threshold)
         free = (near.pair < 0) | (near.distance > self.inside.threshold[near.pair])
         self._count_pairs(near.pair[~free], "too near")
+        if cone is not None:
+            held = cone.holds(q)
+            self.walk.rejected["the tool leans too far"] += int((free & ~held).sum())
+            free &= held
         self.dropped.append(q[~free])
         q = q[free]
         owner = owner[free]
@@ -358,6 +365,11 @@ class _Walker:
         free = found.verdict == FREE
         self._count_pairs(found.pair[~free], "in between too near")
         certified: IntArray = rows[free]
+        cone = self.inside.cone
+        if cone is not None and len(certified):
+            held = cone.edges_held(parents.q[owner[certified]], q[certified])
+            self.walk.rejected["the tool leans too far in between"] += int((~held).sum())
+            certified = certified[held]
         return certified
 
     def _children(
