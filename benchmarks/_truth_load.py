@@ -19,8 +19,15 @@ from _over_seeds import over_seeds
 from _results import Claim, at_least, at_most
 from _truth_section import Asked, Found
 
-from ir_description import Cell, Load, PowerParameters, data_sheet, load_cell, load_power_data
-from ir_description.library import robot_marks
+from ir_description import (
+    Cell,
+    Load,
+    PowerParameters,
+    data_sheet,
+    load_cell,
+    load_power_data,
+    load_robot,
+)
 from ir_kernels.dynamics import DynamicsModel
 from ir_sim_driver.load_check import Declared, LoadFinding, NotedMotion, Uncertainty, weighed
 from ir_sim_driver.plant import Carried, Plant, nominal_plant, typical_plant
@@ -226,7 +233,7 @@ _ROBOTS: dict[tuple[str, str], Uncertainty] = {}
 def _known(cell: Cell, parameters: PowerParameters) -> Uncertainty:
     key = cell.name, parameters.name
     if key not in _ROBOTS:
-        _ROBOTS[key] = Uncertainty(cell.robot, parameters, robot_marks(), cell.base_pose)
+        _ROBOTS[key] = Uncertainty(cell.robot, parameters, load_robot().marks, cell.base_pose)
     return _ROBOTS[key]
 
 

@@ -1,11 +1,11 @@
 """Every figure of the data files has a mark, found by its place."""
 
-from ir_description.library import power_marks, robot_marks
+from ir_description import load_power_data, load_robot
 
 
 def test_every_figure_has_a_mark_under_its_place():
-    robot = robot_marks()
-    power = power_marks()
+    robot = load_robot().marks
+    power = load_power_data().marks
     assert robot["drives.friction_viscous_nms_rad"] == "M"
     assert robot["links.link_2.mass_kg"] == "H"
     assert robot["counterbalance.charge_pressure_pa"] == "M"

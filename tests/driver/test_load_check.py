@@ -7,8 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ir_description import data_sheet, load_cell
-from ir_description.library import robot_marks
+from ir_description import data_sheet, load_cell, load_robot
 from ir_kernels.dynamics import DynamicsModel
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver import ErrorCode, SimulationSettings, TrajectoryGoal, make_simulation
@@ -137,7 +136,7 @@ def test_the_estimated_mass_is_as_uncertain_as_it_says() -> None:
     implementation's draw, without any column of the check.
     """
     load = carried(CELL, "gripper")
-    marks = robot_marks()
+    marks = load_robot().marks
     generator = np.random.default_rng(5)
     declared = Declared(load, Uncertainty(CELL.robot, data_sheet(), marks, CELL.base_pose))
     z = []

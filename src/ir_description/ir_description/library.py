@@ -15,7 +15,7 @@ import resource
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
@@ -99,16 +99,6 @@ def robot_named(name_or_path: str) -> RobotModel:
 def load_power_data(name: str = "kr_c4") -> PowerData:
     """Return the power figures of a bundled controller; the same object for the same name."""
     return bundled_controller(name)
-
-
-def robot_marks() -> Mapping[str, str]:
-    """Return how sure each figure of the KR 210 is, H, M or L by its place."""
-    return load_robot().marks
-
-
-def power_marks() -> Mapping[str, str]:
-    """Return how sure each figure of the KR C4 is, H, M or L by its place."""
-    return load_power_data().marks
 
 
 def load_power_parameters(

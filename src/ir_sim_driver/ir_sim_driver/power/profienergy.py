@@ -81,14 +81,6 @@ def energy_of(mode: PowerMode, pause: float, charging: Charging = uncharged) -> 
     return energy
 
 
-def best_mode(
-    table: tuple[PowerMode, ...], pause: float, charging: Charging = uncharged
-) -> PowerMode:
-    """The mode with the least energy among those that the pause [s] is long enough for."""
-    fitting = [mode for mode in table if pause >= mode.time_min_pause]
-    return min(fitting, key=lambda mode: energy_of(mode, pause, charging))
-
-
 def best_route(
     table: tuple[PowerMode, ...],
     pause: float,
