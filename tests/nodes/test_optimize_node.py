@@ -100,7 +100,7 @@ def test_what_makes_no_sense_is_answered_by_a_sentence(client: Client) -> None:
     error = refused(moving)
     assert error.code == StatusCode.INVALID_MOTION_PLAN
     assert "starts with velocity 0.1 rad/s of joint_a1" in str(error)
-    assert "the shortest within the limits" in str(
+    assert "the shortest found within the limits" in str(
         refused(slow(False), PlanOptions(duration=0.1, planning_time=60.0))
     )
     answer = client.call(OPTIMIZE_TRAJECTORY, OptimizeTrajectory.Request())

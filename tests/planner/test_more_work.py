@@ -166,3 +166,27 @@ def test_a_program_is_planned_with_little_work_and_takes_no_more_than_allowed() 
     assert plan.status.ok, plan.status.message
     assert not plan.info.truncated
     assert plan.info.iterations <= 1_500 * len(planner.cell.program)
+
+
+@pytest.mark.parametrize("cell", ["open", "table_columns"])
+def test_a_movement_that_more_work_finds_is_refused_for_the_work(cell: str) -> None:
+    """Whether a path or a duration is what little work doesn't find."""
+    planner = Planner(cell, clock=lambda: 0.0)
+    rng = np.random.default_rng([3, *cell.encode()])
+    robot = planner.cell.robot
+    refused = 0
+    for _ in range(12):
+        ends = np.array(planner.cell.machine_home) + rng.uniform(-1.5, 1.5, (2, robot.n))
+        start, goal = np.clip(ends, robot.position_min, robot.position_max)
+        fastest = planner.plan_regional(start=start, goal=goal, objective="time")
+        if not fastest.status.ok:
+            continue
+        for most in (300, 3_000):
+            options = PlanOptions(duration=1.01 * fastest.report.duration, max_iterations=most)
+            try:
+                said = planner.plan_regional(start=start, goal=goal, options=options).status.message
+            except RequestError as error:
+                said = str(error)
+            refused += bool(said)
+            assert not said or "max_iterations" in said, said
+    assert refused > 0

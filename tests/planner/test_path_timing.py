@@ -155,7 +155,9 @@ def test_the_objective_counts_at_a_free_duration(scene: PlanningScene) -> None:
 def test_a_duration_that_is_too_short_is_refused_with_the_shortest(scene: PlanningScene) -> None:
     points = waved(scene, 5)
     shortest = planned(points, scene).report.duration
-    with pytest.raises(RequestError, match=f"the shortest within the limits is {shortest:.4g} s"):
+    with pytest.raises(
+        RequestError, match=f"the shortest found within the limits is {shortest:.4g} s"
+    ):
         planned(points, scene, replace(TIME, duration=0.9 * shortest))
 
 

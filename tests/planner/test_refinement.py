@@ -150,7 +150,7 @@ def test_joules_fall_with_the_requested_duration_and_it_is_met(demo_scene: Plann
         report = movement.report
         joules.append(report.energy - report.base_energy)
     assert joules == sorted(joules, reverse=True)
-    with pytest.raises(RequestError, match="the shortest within the limits is"):
+    with pytest.raises(RequestError, match="the shortest found within the limits is"):
         movement_over(
             path, Context.of(demo_scene, replace(options, duration=0.7 * fastest), unhurried())
         )

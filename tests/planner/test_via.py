@@ -97,7 +97,7 @@ def test_a_requested_duration_is_kept_or_refused_with_the_shortest(
     place, goal = drawn(planner, np.random.default_rng(4), 2)
     plan = planner.plan_regional(goal=goal, via=[place], duration=9.0)
     assert plan.report.duration == pytest.approx(9.0, abs=1e-5)
-    with pytest.raises(RequestError, match="shortest within the limits is"):
+    with pytest.raises(RequestError, match="shortest found within the limits is"):
         planner.plan_regional(goal=goal, via=[place], duration=0.05)
 
 

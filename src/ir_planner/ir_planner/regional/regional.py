@@ -88,7 +88,8 @@ def refusal(
     """
     certificate = space.scene.collision.certify_edges(start[None], goal[None], space.threshold)
     tried = ", ".join(f"{stage.name} ({stage.note})" for stage in journal.stages) or "nothing"
-    cut = " within planning_time" if journal.work.truncated else ""
+    ceiling = journal.work.ended_by
+    cut = f" within {ceiling}" if ceiling else ""
     cone = space.cone
     if cone is not None and not path and certificate.verdict[0] == FREE:
         shares = np.linspace(0.0, 1.0, _SHARES)

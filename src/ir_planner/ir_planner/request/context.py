@@ -73,6 +73,13 @@ class Work:
         """Whether searches must end: by work, or cut by time."""
         return self.late or self.iterations >= self.max_iterations
 
+    @property
+    def ended_by(self) -> str:
+        """The ceiling that ended searches before all was tried; "": none."""
+        if self.truncated:
+            return "planning_time"
+        return "max_iterations" if self.left < self.improvement else ""
+
 
 @dataclass
 class Journal:

@@ -270,7 +270,8 @@ def blocked(found: Withdrawal, problem: Exit, journal: Journal) -> Status:
         else f" (clearance there {pair.distance * 1e3:.1f} mm, {pair.body_a} to {pair.body_b})"
     )
     depth = max(problem.safety_distance - found.zone_distance, 0.0)
-    cut = " within planning_time" if journal.work.truncated else ""
+    ceiling = journal.work.ended_by
+    cut = f" within {ceiling}" if ceiling else ""
     met = Counter({reason: n for reason, n in found.rejected.items() if "too near" in reason})
     obstructing = (
         ", ".join(f"{reason} ({count})" for reason, count in met.most_common(4)) or "nothing met"

@@ -234,16 +234,22 @@ def _and_tool(context: Context) -> str:
 
 
 def check_requested(shortest: float, context: Context) -> None:
-    """Raise RequestError where a duration is requested that is shorter than the shortest [s] there
-    is.
+    """Raise RequestError where a duration is requested that is shorter than the shortest [s] that
+    was found.
     """
     options = context.options
     if options.duration > 0.0 and shortest * (1.0 - DURATION_SLACK) > options.duration:
         raise RequestError(
             StatusCode.INVALID_GOAL_CONSTRAINTS,
-            f"duration is {options.duration:g} s: the shortest within the limits"
-            f"{_and_tool(context)} is {shortest:.4g} s",
+            f"duration is {options.duration:g} s: the shortest found within the limits"
+            f"{_and_tool(context)} is {shortest:.4g} s{_unfinished(context)}",
         )
+
+
+def _unfinished(context: Context) -> str:
+    """What ended the search for a shorter movement before all was tried; "": nothing."""
+    ceiling = context.work.ended_by
+    return f"; {ceiling} ended before all was tried: more of it may help" if ceiling else ""
 
 
 def slowed_for_tool(trajectory: JointTrajectory, context: Context) -> JointTrajectory:

@@ -261,7 +261,7 @@ class _Optimization:
         if fastest.report.duration > requested:
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"duration is {requested:g} s: the shortest within the limits near the "
+                f"duration is {requested:g} s: the shortest found within the limits near the "
                 f"trajectory is {fastest.report.duration:.4g} s",
             )
         movement = fastest.stretched_by(requested / fastest.report.duration)
