@@ -399,7 +399,8 @@ def drawn_rows(arguments: argparse.Namespace, seeds: int, seconds: float) -> lis
     """Drawn cells and files."""
     rows = []
     for text, peer in texts(seeds, arguments.file, large=not arguments.quick):
-        for element, instance in zip(ET.fromstring(text), instances(text), strict=True):
+        elements = ET.fromstring(text).findall("instance")  # a data set may have a name, too
+        for element, instance in zip(elements, instances(text), strict=True):
             rows.append(row_of(element, solve_cell(instance, seconds), seconds, peer=peer))
             print(line_of(asdict(rows[-1])), flush=True)
     return rows

@@ -307,7 +307,7 @@ class CycleSteps:
         lengths = self._lengths(choice, found)
         visits = self._cycle.visits
         begins, period = soonest(self._cycle, lengths, self._machines())
-        again = []
+        again: list[Visit] = []
         free = 0.0
         for visit, (moving, hop), begin in zip(visits, lengths, begins, strict=True):
             waited = begin - free if again else period - begins[-1] - sum(lengths[-1])
