@@ -57,7 +57,7 @@ class Browser:
 
     def press(self, name: str, level: bool, stop: str | None = None) -> dict[str, Any]:
         seen = self.state.get("stop", "") if stop is None else stop
-        value = {"level": level, "stop": seen}
+        value = {"level": level, "stop": seen} if seen else level
         connection = HTTPConnection("127.0.0.1", self._port, timeout=PATIENCE)
         headers = {"X-Live-Token": self._token, "Content-Type": "application/json"}
         connection.request("POST", "/press", json.dumps({"name": name, "value": value}), headers)

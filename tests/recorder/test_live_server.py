@@ -136,7 +136,6 @@ def test_a_button_needs_the_token_and_a_request_that_makes_sense(cell: Cell) -> 
         "{",
         '{"name": 1, "value": true}',
         '{"name": "ab", "value": 1}',
-        '{"name": "ab", "value": true}',
         '{"name": "ab", "value": {"level": true}}',
         '{"name": "ab", "value": {"level": true, "stop": 3}}',
         '{"name": "ab", "value": {"level": true, "stop": "99999999999999999999"}}',

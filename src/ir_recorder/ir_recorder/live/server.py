@@ -137,7 +137,9 @@ class Site:
 
 
 def _is_level(value: object) -> bool:
-    """Whether it is a level, and the last stop that whoever asks for it has seen."""
+    """Whether it is a level, with or without the last stop that whoever asks for it has seen."""
+    if isinstance(value, bool):
+        return True
     if not isinstance(value, dict) or set(value) != {"level", "stop"}:
         return False
     level = value["level"]
@@ -149,7 +151,7 @@ LIVE = Site(
     "view_live.html",
     ("live_motion.js", "live.js"),
     _is_level,
-    '{"level": true or false, "stop": TEXT, the number of the last stop that the page shows}',
+    'true, false or {"level": true or false, "stop": TEXT, the last stop that the page shows}',
     private=False,
 )
 """Of a cell whose nodes run: whoever is on this machine may watch; buttons need the token."""
@@ -482,13 +484,14 @@ class Commands:
         self._stops: queue.Queue[LevelCommand] = queue.Queue()
         self._order = threading.Lock()  # of presses and of what waits when they come
 
-    def press(self, name: str, value: Mapping[str, Any]) -> ButtonAnswer:
+    def press(self, name: str, value: Any) -> ButtonAnswer:
         """Asks and waits; refuses what is no bit, and what comes faster than it is answered."""
         if name not in BITS:
             return ButtonAnswer(
                 False, f"{name[:60]!r} is no bit of the PLC: known are {', '.join(BITS)}"
             )
-        command = LevelCommand(name, value["level"], int(value["stop"] or 0))
+        asked = {"level": value, "stop": ""} if isinstance(value, bool) else value
+        command = LevelCommand(name, asked["level"], int(asked["stop"] or 0))
         stop = command.presses_the_stop
         try:
             with self._order:
