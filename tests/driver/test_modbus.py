@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import socket
 import struct
+import time
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from ir_msgs_py.modes import Mode, TransitionTimes
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_sim_driver.controller.driver import Driver
 from ir_sim_driver.controller.settings import ControllerSettings
-from ir_sim_driver.errors import DriverError, TrajectoryRefusedError
+from ir_sim_driver.errors import DriverError, RequestRefusedError, TrajectoryRefusedError
 from ir_sim_driver.plc.inputs import PlcSettings
 from ir_sim_driver.plc.modbus import (
     COILS,
@@ -99,6 +100,40 @@ def test_pause_and_operating_mode_are_registers(make, serve):
     assert (refused.isError(), refused.exception_code) == (True, 3)
     refused = client.write_register(PAUSE, 60)  # not in T1
     assert refused.exception_code == 3
+
+
+def test_what_came_before_a_stop_acknowledges_nothing_and_a_press_counts(make, serve):
+    """As coils that were written while the driver was suspended, and are read after a press."""
+    driver, client, _ = serve(make())
+    before = time.monotonic_ns()
+    driver.press("service", "emergency_stop", True)
+    number = driver.stop_number
+    for late in ({"conf_mess": True}, {"drives_on": True}, {"emergency_stop": False}):
+        with pytest.raises(RequestRefusedError, match="before stop"):
+            driver.plc.write_inputs("modbus", late, before)
+    with pytest.raises(RequestRefusedError, match="before stop"):
+        driver.plc.write_inputs("modbus", {"emergency_stop": True, "conf_mess": True}, before)
+    driver.plc.write_inputs("modbus", {"emergency_stop": True}, before)
+    assert driver.plc.inputs().emergency_stop
+    assert not driver.plc.inputs().conf_mess
+    assert driver.stop_number == number  # the button is down
+    assert not client.write_coil(coil("conf_mess"), True).isError()  # it comes now
+
+
+def test_a_press_on_a_connection_that_finds_no_place_counts(make, serve):
+    driver, client, port = serve(make(), modbus_connections=2)
+    speaking = ModbusTcpClient("127.0.0.1", port=port, timeout=PATIENCE)
+    assert speaking.connect()
+    for place in (client, speaking):
+        assert not place.read_coils(0, count=1).isError()
+    number = driver.stop_number
+    pressing = ModbusTcpClient("127.0.0.1", port=port, timeout=PATIENCE, retries=0)
+    assert pressing.connect()
+    assert not pressing.write_coil(coil("emergency_stop"), True).isError()
+    assert driver.stop_number != number
+    assert not client.read_coils(0, count=1).isError()
+    pressing.close()
+    speaking.close()
 
 
 def test_registers_are_written_all_or_none(make, serve):

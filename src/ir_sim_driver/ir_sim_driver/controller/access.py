@@ -143,10 +143,10 @@ class PlcSide:
         with self._access.reading() as simulation:
             return simulation.plc.raw
 
-    def write_inputs(self, writer: str, levels: Mapping[str, bool]) -> None:
+    def write_inputs(self, writer: str, levels: Mapping[str, bool], came_ns: int = 0) -> None:
         """Set these levels, the others stay. Raises RequestRefusedError."""
         with self._access.writing() as simulation:
-            simulation.plc.write(writer, levels)
+            simulation.plc.write(writer, levels, came_ns=came_ns)
 
     def write_all_inputs(self, writer: str, *inputs: PlcInputs) -> None:
         """Set all levels at once, several times in a row. Raises RequestRefusedError when all are

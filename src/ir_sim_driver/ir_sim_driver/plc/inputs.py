@@ -221,14 +221,21 @@ class Plc:
         self._greeted = False
         self._judged: tuple[object, bool] = (None, False)
 
-    def write(self, writer: str, levels: Mapping[str, bool], client: str = "") -> None:
+    def write(
+        self, writer: str, levels: Mapping[str, bool], client: str = "", came_ns: int = 0
+    ) -> None:
         """Set these levels in the name of a writer (one of WRITERS), the others stay.
 
-        client: of the service. Raises RequestRefusedError; a pressed emergency stop counts even
-        then.
+        client: of the service. came_ns: when they came at the earliest, 0: now; before the last
+        stop, unless the same writer gave it, only a press counts. Raises RequestRefusedError; a
+        pressed emergency stop counts even then.
         """
         pressed = levels.get(STOP_BIT, False)
         number = self.stop.number
+        if self._came_before_the_stop(writer, came_ns) and not (pressed and len(levels) == 1):
+            if pressed:
+                self.write(writer, {STOP_BIT: True}, client)
+            self.stop.refuse_earlier(came_ns, " and ".join(levels))
         try:
             self._guard(writer, pressed, alone=pressed and len(levels) == 1)
             self._greeted = True
@@ -237,6 +244,11 @@ class Plc:
                 self._set(bit, levels[bit], giver=giver_of(writer, client))
         finally:
             self._note_stop(writer, number)
+
+    def _came_before_the_stop(self, writer: str, came_ns: int) -> bool:
+        """Whether what a writer wrote came before the last stop, which was not its own."""
+        own = self._stopped_by == (writer, self.stop.number)
+        return not own and self.stop.came_later(came_ns)
 
     def write_all(self, writer: str, written: Written) -> None:
         """Set all levels in the name of a writer. Raises as `write`.
@@ -247,9 +259,7 @@ class Plc:
         """
         inputs = written.inputs
         number = self.stop.number
-        late = written.overtaken or (
-            self._stopped_by != (writer, number) and self.stop.came_later(written.came_ns)
-        )
+        late = written.overtaken or self._came_before_the_stop(writer, written.came_ns)
         if written.again and self.stop.pressed:
             self.stop.press_again(self.order)
             inputs = inputs.with_bit(STOP_BIT, False)

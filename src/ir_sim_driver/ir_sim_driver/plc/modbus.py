@@ -6,6 +6,7 @@ import asyncio
 import logging
 import struct
 import threading
+import time
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -51,7 +52,13 @@ class ExceptionCode(IntEnum):
 
 
 class Tables(Protocol):
-    """What requests read and write; each raises ModbusRefusedError, and has done nothing then."""
+    """What requests read and write; each raises ModbusRefusedError, and has done nothing then.
+
+    came_ns: when the request that is being answered came at the earliest [ns of the monotonic
+    clock], 0: now.
+    """
+
+    came_ns: int
 
     def coils(self) -> Sequence[bool]:
         """All coils."""
@@ -236,6 +243,7 @@ class ControllerTables:
         self._controller = controller
         self._watchdog = watchdog
         self._pause = 0
+        self.came_ns = 0
 
     def coils(self) -> list[bool]:
         """Levels as they were written last, by whomever; the heartbeat reads 0."""
@@ -271,7 +279,7 @@ class ControllerTables:
             return
         beats = named.pop(COILS[HEARTBEAT], None) is not None
         if named:
-            _asked(lambda: self._controller.write_inputs(MODBUS, named))
+            _asked(lambda: self._controller.write_inputs(MODBUS, named, self.came_ns))
         if beats:
             self._controller.heartbeat(self._watchdog)
 
@@ -329,7 +337,10 @@ _LOG = logging.getLogger(__name__)
 _HEADER = struct.Struct(">HHHB")  # transaction, protocol, bytes that follow, unit
 _LONGEST = 254  # bytes that follow, of the largest request that there can be
 _HELD = 1.0  # s; a client that has said something since then keeps its place
+_LEAVING = 256  # clients without a place that may still say one thing
 _CLOSING = 5.0  # s
+_TURN = 0.02  # s between two looks of the server at the clock
+_SUSPENDED = 0.1  # s without a look: what is read then may be as old
 _DROPPED = (OSError, TimeoutError, asyncio.IncompleteReadError)  # how connections end
 
 
@@ -345,8 +356,9 @@ class ModbusServer:
     """Serves `tables` on host:port until it is closed. Raises OSError when the port can't be had.
 
     When all connections are taken, a new one takes the place of the one that has been silent for
-    longest, or is closed where none has been silent for a second. A frame that is not Modbus ends
-    its connection.
+    longest, where that is a second at least. Who has no place, or loses it, may still say one thing
+    within a second: a press of the emergency stop that is on its way counts. A frame that is not
+    Modbus ends its connection.
     """
 
     def __init__(
@@ -357,6 +369,8 @@ class ModbusServer:
         self._heard: dict[
             asyncio.StreamWriter, float
         ] = {}  # last request, or begin, of each client [s]
+        # without a place, and when each is closed
+        self._leaving: dict[asyncio.StreamWriter, asyncio.TimerHandle] = {}
         self._reported: set[type[Exception]] = set()
         self._loop = asyncio.new_event_loop()
         # without descriptors no client can be accepted: asyncio tries again every second, and need
@@ -370,6 +384,9 @@ class ModbusServer:
             self._loop.close()
             raise OSError(f"TCP {host}:{port} can't be opened ({error})") from error
         self.port = int(self._server.sockets[0].getsockname()[1])
+        self._looked = time.monotonic()
+        self._before_gap = self._gap_ended = -float("inf")
+        self._loop.call_soon(self._look_at_the_clock)
         self._thread = threading.Thread(target=self._run, name="modbus", daemon=True)
         self._thread.start()
 
@@ -384,20 +401,22 @@ class ModbusServer:
             self._loop.run_forever()
         finally:
             self._server.close()
-            for writer in self._heard:
+            for writer in (*self._heard, *self._leaving):
                 writer.transport.abort()
             self._loop.run_until_complete(_end(asyncio.all_tasks(self._loop)))
             self._loop.close()
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        if not self._has_place():
-            writer.transport.abort()
-            return
-        self._heard[writer] = self._loop.time()
+        if self._has_place():
+            self._heard[writer] = self._loop.time()
+        else:
+            self._take_leave(writer)
         try:
             while request := await self._within(_next_request(reader)):
-                self._heard[writer] = self._loop.time()
                 writer.write(self._answer(*request))
+                if writer in self._leaving:
+                    break
+                self._heard[writer] = self._loop.time()
                 await self._within(writer.drain())
                 # others' turn: requests that are here already need no waiting
                 await asyncio.sleep(0)
@@ -405,7 +424,15 @@ class ModbusServer:
             pass
         finally:
             self._heard.pop(writer, None)
+            self._leaving.pop(writer, None)
             writer.close()
+
+    def _take_leave(self, writer: asyncio.StreamWriter) -> None:
+        """Give a client that has no place a second to say one thing."""
+        if len(self._leaving) >= _LEAVING:
+            next(iter(self._leaving)).transport.abort()
+            del self._leaving[next(iter(self._leaving))]
+        self._leaving[writer] = self._loop.call_later(_HELD, writer.transport.abort)
 
     async def _within(self, work: Awaitable[T]) -> T:
         async with asyncio.timeout(self._limits.idle):
@@ -419,10 +446,29 @@ class ModbusServer:
         if self._loop.time() - self._heard[eldest] < _HELD:
             return False
         del self._heard[eldest]
-        eldest.transport.abort()
+        self._take_leave(eldest)
         return True
 
+    def _look_at_the_clock(self) -> None:
+        """Note a gap, in which this process did not run: what is read just after it may be as old
+        as the look before.
+        """
+        now = time.monotonic()
+        if now - self._looked > _SUSPENDED:
+            self._before_gap = self._looked
+            self._gap_ended = now
+        self._looked = now
+        self._loop.call_later(_TURN, self._look_at_the_clock)
+
+    def _came_ns(self) -> int:
+        """When a request that is read now came at the earliest [ns]; 0: now."""
+        now = time.monotonic()
+        if now - self._looked > _SUSPENDED:
+            return int(self._looked * 1e9)
+        return int(self._before_gap * 1e9) if now - self._gap_ended < _SUSPENDED else 0
+
     def _answer(self, transaction: int, unit: int, request: bytes) -> bytes:
+        self._tables.came_ns = self._came_ns()
         try:
             answer = answered(request, self._tables)
         except (

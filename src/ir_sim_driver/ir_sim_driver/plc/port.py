@@ -46,8 +46,10 @@ class Controller(Protocol):
     def inputs(self) -> PlcInputs:
         """Levels of the inputs as they were written last."""
 
-    def write_inputs(self, writer: str, levels: Mapping[str, bool]) -> None:
-        """Set these levels, the others stay."""
+    def write_inputs(self, writer: str, levels: Mapping[str, bool], came_ns: int = 0) -> None:
+        """Set these levels, the others stay. came_ns: when they came at the earliest [ns of the
+        monotonic clock], 0: now; only a press of the emergency stop may come before the last stop.
+        """
 
     def write_mode_and_pause(
         self, writer: str, mode: OperatingMode | None, pause: float | None
