@@ -190,3 +190,14 @@ def test_ten_megabytes_are_refused_in_a_sentence(ask):
         ).results
         assert not result.successful
         assert len(result.reason) < 5_000
+
+
+def test_more_parameters_than_a_request_may_have_are_refused_as_one(ask):
+    (result,) = ask(SetParameters, "set_parameters", [SPEED] * 20_000).results
+    assert not result.successful
+    assert result.reason == "20000 parameters in one request: at most 500 are taken"
+    whole = ask(SetParametersAtomically, "set_parameters_atomically", [SPEED] * 501).result
+    assert "501 parameters" in whole.reason
+    assert all(
+        each.successful for each in ask(SetParameters, "set_parameters", [SPEED] * 500).results
+    )

@@ -53,6 +53,8 @@ def answer_always(node: Node) -> None:
 
 def _guarded(callback: Callback) -> Callback:
     def answer(request: Any, response: Any) -> Any:
+        if (count := _entries(request)) > MOST_ENTRIES:
+            return _refused_whole(request, response, count)
         try:
             response = callback(request, response)
         except ANY as error:
@@ -63,6 +65,22 @@ def _guarded(callback: Callback) -> Callback:
 
     answer.guarded = callback  # type: ignore[attr-defined]
     return answer
+
+
+def _entries(request: Any) -> int:
+    """How many parameters a request is about; lists of prefixes are short work."""
+    return len(getattr(request, "parameters", ()) or getattr(request, "names", ()))
+
+
+def _refused_whole(request: Any, response: Any, count: int) -> Any:
+    """Nothing of the request is done; one result says so for all."""
+    reason = f"{count} parameters in one request: at most {MOST_ENTRIES} are taken"
+    refusal = SetParametersResult(successful=False, reason=reason)
+    if isinstance(response, SetParameters.Response):
+        response.results = [refusal]
+    elif isinstance(response, SetParametersAtomically.Response):
+        response.result = refusal
+    return response
 
 
 def _refused(request: Any, response: Any, reason: str) -> Any:
@@ -85,6 +103,10 @@ def _results(response: Any) -> Sequence[Any]:
 
 T = TypeVar("T")
 _INT64 = 2**63
+MOST_ENTRIES = 500
+"""Of one request for parameters; rclpy takes 1.5 ms to set one, and the node answers nothing else
+meanwhile.
+"""
 _EVENTS = 100  # of a service that wait for a slow listener
 
 
