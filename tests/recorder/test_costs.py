@@ -255,7 +255,9 @@ def test_without_a_program_there_is_nothing_to_pay(analysis: Analysis) -> None:
 def test_a_saving_pays_for_hours_of_an_engineer(saved: float, words: str) -> None:
     costs = Costs(engineer_hour=60.0)
     year = Amount(1.0, 0.5, 1.5).times(saved)
-    assert payback(year, costs) == f"pays for {words} h of an engineer a year, at 60 EUR"
+    assert payback(year, costs) == (
+        f"pays back in a year what takes less than {words} h of an engineer (60 EUR/h)"
+    )
     assert payback(replace(year, low=-year.low), costs) == ""
 
 

@@ -490,7 +490,8 @@ def payback(money: Amount, costs: Costs) -> str:
     if money.doubt or money.value < _NOTHING or costs.engineer_hour <= 0.0:
         return ""
     hours = significant(money.value / costs.engineer_hour, 2)
-    return f"pays for {hours} h of an engineer a year, at {costs.engineer_hour:g} {costs.currency}"
+    hour = f"{costs.engineer_hour:g} {costs.currency}/h"
+    return f"pays back in a year what takes less than {hours} h of an engineer ({hour})"
 
 
 def share_between(amount: Amount, of: float) -> str:
@@ -538,6 +539,15 @@ def small_span(amount: Amount, show: Callable[[float], str]) -> str:
 
 
 # What the amounts rest on: a sentence where they stand, and all settings as a table.
+
+
+def assumed_prices(costs: Costs) -> str:
+    """The price and the shifts that a year is counted with, in a few words."""
+    own = {"price", "shift_hours", "shifts_per_day", "days_per_year"} <= set(costs.given)
+    return (
+        f"At {_setting(costs, 'price')}, {costs.shifts_per_day:g} x {costs.shift_hours:g} h on "
+        f"{costs.days_per_year:g} days a year{'' if own else ', assumed'}"
+    )
 
 
 def counted_with(costs: Costs) -> str:
@@ -635,6 +645,8 @@ def lever_section(analysis: Analysis, costs: Costs) -> str:
     idle = None if known else recorded_idle_saving(analysis, costs)
     if idle is not None:
         words = f"{idle.mode} instead of brakes that are only closed, {idle.basis}"
+        ends = f"{yearly_span(idle.money.low, idle.money.high)} {costs.currency}"
+        words += f", 90 % interval {ends}" if idle.money.low < idle.money.high else ""
         name = f"at night and at weekends<small>{text(words)}</small>"
         rows.append((idle.saved, name, DASH))
     rows.sort(key=lambda row: -row[0])

@@ -38,9 +38,9 @@ from ir_values.arrays import FloatArray
 MOST_POINTS = 24_000  # of the power curve: 4 minutes as they were read
 _BITS = {
     "ab": "bus off",
-    "hib": "sleep",
+    "hib": "hibernate",
     "bbs": "ready",
-    "drives_ready": "drives on",
+    "drives_ready": "drives ready",
     "emergency_stop": "stop",
 }
 MOST_CLEARANCES = 6_000  # per movement: 2 minutes at the 50 Hz of the profile

@@ -923,7 +923,8 @@ def _night(
         return []
     own = {robot.name: _idle_saving(_own(members, robot), costs) for robot in robots}
     energies = {name: idle.energy.value for name, idle in own.items() if idle is not None}
-    basis = f"{nights.mode} instead of closed brakes, {nights.basis}"
+    ends = f"{yearly_span(nights.money.low, nights.money.high)} {costs.currency}"
+    basis = f"{nights.mode} instead of closed brakes, {nights.basis}, 90 % interval {ends}"
     name = f"at night and at weekends<small>{text(basis)}</small>"
     return [(nights.saved, name, energies)]
 

@@ -14,6 +14,7 @@ from ir_recorder.report.costs import (
     Costs,
     IdleSaving,
     SavedYear,
+    assumed_prices,
     money_of,
     money_of_thousand,
     payback,
@@ -94,7 +95,7 @@ class Paid:
             f"{words}.",
             self.sure(costs),
             first_steps(steps, self.idle, costs) or "Keep the program as it is.",
-            [*_of_parts(part, costs), *a_night(self.idle, costs)],
+            [*_of_parts(part, costs), *a_night(self.idle, costs), f"{assumed_prices(costs)}."],
         )
 
     def sure(self, costs: Costs) -> str:
@@ -102,7 +103,11 @@ class Paid:
         said = []
         if self.saved is not None:
             between = _between(self.year(costs).money.gain()[1], costs)
-            said += [f"{between}." if between else "", self.supply, "What plans save is predicted."]
+            said += [
+                f"{between}, of the robot's data alone." if between else "",
+                self.supply,
+                "What plans save is predicted.",
+            ]
         said.append(self.run)
         if self.idle is not None:
             late = "a robot that is woken late delays the first cycle"

@@ -358,9 +358,8 @@ def _answer(
     )
     ends_of = yearly_span(year.money.low, year.money.high)
     sure = (
-        f"90 % interval {ends_of} {costs.currency}, over robots as the data sheet allows them"
-        f"{_one_sided(year.money)}; {_between_seeds(one)}. {_at_limits(one, settings)}"
-        "Predicted, not driven."
+        f"90 % interval {ends_of} {costs.currency}, of the robot's data alone; "
+        f"{_between_seeds(one)}. {_at_limits(one, settings)}Predicted, not driven."
     )
     if year.money.value <= 0.0 or year.money.low <= 0.0:
         result = "No placement is shown to save"
@@ -387,13 +386,6 @@ def _verdict(finals: Sequence[Sequence[Final]], costs: Costs) -> tuple[str, bool
     if year.money.low <= 0.0 or year.money.value < costs.engineer_hour:
         return "Leave as it stands", False
     return "Moving pays, predicted", True
-
-
-def _one_sided(money: Amount) -> str:
-    """That an interval begins at its value, where it does; "" where it doesn't."""
-    if money.low < money.value:
-        return ""
-    return ": it begins at the value itself, as none of the likely robots saves less"
 
 
 def _between_seeds(one: Final) -> str:

@@ -117,7 +117,7 @@ function laneKey(place, lanes) {
     place.append(item);
   }
   if (lanes.some((lane) => lane.label.endsWith(" ?"))) {
-    place.append(Object.assign(document.createElement("span"), { textContent: "PLC: with ? what it asks of the controller (drive bus off; sleep: hibernation), without what the controller answers" }));
+    place.append(Object.assign(document.createElement("span"), { textContent: "PLC: with ? what it asks of the controller (bus off: of the drives), without what the controller answers" }));
   }
 }
 

@@ -2,8 +2,8 @@
 /* Keeps what the server sends, and shows it: now, or at the time that was clicked. */
 
 const WINDOW = 60, KEPT_SECONDS = 600, PRUNE = 500;
-const LANE_BITS = [["in", "ab", "bus off ?"], ["in", "hib", "sleep ?"], ["in", "emergency_stop", "stop ?"], ["out", "bbs", "ready"], ["out", "ab", "bus off"],
-  ["out", "drives_ready", "drives on"]];
+const LANE_BITS = [["in", "ab", "bus off ?"], ["in", "hib", "hibernate ?"], ["in", "emergency_stop", "stop ?"], ["out", "bbs", "ready"], ["out", "ab", "bus off"],
+  ["out", "drives_ready", "drives ready"]];
 
 /* Follows the present until somebody looks at the past. */
 class LiveTimeline extends Timeline {

@@ -22,7 +22,7 @@ function figures(state, energy) {
     ["power at the mains", watts, energy === null ? "" : `${energy >= 3.6e6 ? `${(energy / 3.6e6).toFixed(2)} kWh` : `${(energy / 3600).toFixed(1)} Wh`} since this page was opened`],
     ["mode", state.w ? modeWords(state.mode) || "–" : "–", target],
     ["step of the program", step ? step.label : "–", step ? [total, step.event === "started" ? "runs" : step.event, step.event === "failed" ? "" : step.note].filter(Boolean).join(", ") : "no program was run"],
-    ["nearest pair", near ? `${(near[0] * 1000).toFixed(0)} mm` : "–", near ? `${near[7]}${short ? `, below the safety distance of ${+(state.bound * 1000).toFixed(1)} mm` : ""}` : "", short],
+    ["nearest pair", near ? `${(near[0] * 1000).toFixed(0)} mm` : "–", near ? `${near[7]}, ${short ? "below" : "above"} the safety distance of ${+(state.bound * 1000).toFixed(1)} mm` : "", short],
     ["load", state.load === "none" ? "nothing" : state.load || "–", state.driving && state.scaling !== null && state.scaling < 1 ? `speed ${Math.round(state.scaling * 100)} %` : ""],
   ];
 }
