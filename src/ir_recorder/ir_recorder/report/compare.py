@@ -157,8 +157,7 @@ def _answer(analyses: Sequence[Analysis], names: Sequence[str], costs: Costs) ->
         less = yearly_money(first.value - known[least].value, costs.currency)
         return Answer(f"{least}: {less} less a year", words, sure, f"Drive {least}.")
     if len(names) == _BESIDE and analyses[0].program is not analyses[1].program is None:
-        agree = f"{names[1]} predicts what {names[0]} takes"
-        return Answer(agree, words, sure, "Nothing: a year of both costs alike.")
+        return Answer("The plan predicts the run", words, sure, "Nothing: both cost alike.")
     result = f"None is shown to cost less than {names[0]}"
     return Answer(result, words, sure, "Choose by time, peak or clearance: Runs in figures.")
 
