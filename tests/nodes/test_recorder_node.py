@@ -345,6 +345,29 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(
     wait_for(lambda: node.failure)  # of this one too, or the end of the node would say it
 
 
+def test_messages_that_never_arrived_are_said_by_stop_and_by_the_file(
+    recorder: RecorderNode,
+    call: Any,
+    ros_node: Any,
+    ros_executor: Any,
+    wait_for: Any,
+    tmp_path: Path,
+) -> None:
+    """As of a recorder that was suspended while more came than are kept for it."""
+    publisher = ros_node.create_publisher(String, "/robot_description", 10)
+    path = tmp_path / "suspended.mcap"
+    start(call, path)
+    wait_for(lambda: publisher.get_subscription_count(), what="the recorder listens")
+    number = recorder._listener._count
+    number("/robot_description", 1)
+    number("/robot_description", 9)
+    answer = stop(call)
+    assert answer.status.code == StatusCode.SUCCESS
+    assert answer.dropped == 7
+    assert "7 lost: they never arrived" in answer.status.message
+    assert "7 messages never arrived at the recorder" in read_raw(path).problems
+
+
 def test_a_recording_that_lost_its_file_says_so_and_goes_on_in_another(
     recorder: RecorderNode, ros_node: Any, call: Any, wait_for: Any, tmp_path: Path
 ) -> None:

@@ -27,6 +27,8 @@ ARITHMETIC: Final = "arithmetic"  # fact: digest of numbers whose bits may diffe
 RECORDING: Final = "recording"  # of a recording in several files: the same in all of them
 PART: Final = "part"  # which of them, from 0
 REPEATED: Final = "repeated"  # JSON: messages by topic that a part has again at its begin
+LOST: Final = "ir_recorder_lost"  # metadata record of the next
+MESSAGES_LOST: Final = "messages_lost"  # that never arrived at the recorder
 PARTS: Final = "ir_recorder_part"  # metadata record of these three
 # all others come from the recorder's parameter
 OWN_FACTS: Final = (

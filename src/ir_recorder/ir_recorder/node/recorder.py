@@ -102,10 +102,12 @@ class RecorderServices:
             response.paths = [str(path) for path in summary.paths]
             response.messages = summary.messages
             response.seconds = summary.seconds
-            response.dropped = summary.dropped
+            response.dropped = summary.dropped + summary.lost
             held = f"{summary.messages} messages over {summary.seconds:.1f} s"
             if summary.dropped:
                 held += f", {summary.dropped} dropped: the disk was too slow"
+            if summary.lost:
+                held += f", {summary.lost} lost: they never arrived, as where a node was suspended"
             held += without_publisher(unmet, "was seen")
             if lost:
                 raise LostFileError(f"{lost}: {held}")
@@ -321,13 +323,16 @@ class RecorderNode(Node):
         if recording is None:
             return None
         try:
-            summary = recording.finish()
+            lost = self._listener.lost
+            if lost:
+                recording.do(lambda session: session.note_lost(lost))
+            summary = replace(recording.finish(), lost=lost)
         except WriteError as error:
             self._failure = str(error)
             raise
         self.get_logger().info(
             f"{summary.path}: {summary.messages} messages over {summary.seconds:.1f} s, "
-            f"{self._listener.lost} lost, {summary.dropped} dropped"
+            f"{summary.lost} lost, {summary.dropped} dropped"
         )
         return summary
 

@@ -281,6 +281,8 @@ def _read_file(path: Path, roots: FileRoots, chunks: ChunkReader) -> RawRecordin
         raise ReadError(
             one_line(f"{path} holds no messages" + "".join(f"; {p}" for p in found.problems))
         )
+    lost = [value for name, value in found.facts if name == contents.MESSAGES_LOST]
+    found.problems += [f"{value} messages never arrived at the recorder" for value in lost]
     problems = tuple(map(one_line, found.problems))
     return RawRecording(
         path, tuple(found.raw_channels()), tuple(found.attachments), tuple(found.facts), problems

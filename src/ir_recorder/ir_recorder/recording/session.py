@@ -250,6 +250,10 @@ class RecordingSession:
         """Leaves no message in memory."""
         self._writer.flush()
 
+    def note_lost(self, count: int) -> None:
+        """Say beside the messages how many never arrived."""
+        self._writer.facts(contents.LOST, {contents.MESSAGES_LOST: str(count)})
+
     def finish(self) -> RecordingSummary:
         """Closes the file with its indexes."""
         self._writer.finish()

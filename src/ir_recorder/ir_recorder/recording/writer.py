@@ -40,7 +40,8 @@ _NAME_MAX = 200  # bytes of a file's name; file systems end at 255
 @dataclass(frozen=True)
 class RecordingSummary:
     """What a finished recording holds: its file (the first, where `paths` has several), the number
-    of messages, the time they span [s], and how many messages the disk was too slow for.
+    of messages, the time they span [s], how many messages the disk was too slow for, and how many
+    never arrived.
     """
 
     path: Path
@@ -48,6 +49,7 @@ class RecordingSummary:
     seconds: float
     paths: tuple[Path, ...] = ()
     dropped: int = 0
+    lost: int = 0
 
 
 class RecordingWriter:
