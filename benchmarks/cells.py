@@ -133,7 +133,7 @@ class RobotsRow:
     nearest: float = np.inf
     without_signals: float = np.inf
     seconds: float = np.nan
-    judging: float = np.nan
+    judging_seconds: float = np.nan
     refused: str = ""
 
 
