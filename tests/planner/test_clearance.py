@@ -53,7 +53,7 @@ def wandering(scene: PlanningScene, seed: int) -> JointTrajectory:
     max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(
-    cell=st.sampled_from(["demo", "cnc_door", "table_columns", "deep_box"]),
+    cell=st.sampled_from(["demo", "cnc_door", "table_columns", "deep_box", "kr6_bench"]),
     seed=st.integers(0, 10_000),
 )
 def test_no_distance_is_below_the_bound(cell: str, seed: int, scene_of: SceneOf) -> None:
@@ -66,7 +66,8 @@ def test_no_distance_is_below_the_bound(cell: str, seed: int, scene_of: SceneOf)
     lowest = [*np.argsort(near)[:8], *np.random.default_rng(seed).integers(0, len(q), 8)]
     if profile.bound > 0.0:  # in penetration depths of the two differ in kind
         assert min(coal_distance(scene, q[k]) for k in lowest) >= profile.bound - COAL
-        assert profile.smallest.distance - profile.bound <= 1.1e-5
+        lasting = (near <= near.min() + 1e-5).mean() > 0.15
+        assert profile.smallest.distance - profile.bound <= (1.1e-4 if lasting else 1.1e-5)
     assert near.min() >= profile.bound
 
 

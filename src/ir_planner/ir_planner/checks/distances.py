@@ -24,6 +24,10 @@ _PER_ZOOM = 9
 _MINIMA = 4  # local minima of the samples that are looked at closely; the proof meets the others
 # m by which the bound lies below the smallest distance found: finer costs, and nobody needs it
 _TIGHT = 1e-5
+# the same where a pair is that near for a larger share of the time, as a link that turns beside the
+# base: there a tight proof looks at every instant
+_TIGHT_FOR_LONG = 1e-4
+_LONG = 0.2
 _LOOSER = 4.0  # times as much where that can't be proved
 _PROOFS = 12
 
@@ -34,8 +38,9 @@ class ClearanceProfile:
     own (inf: no pair).
 
     bound [m]: proved, no distance at any instant is smaller; it lies 1e-5 m below the smallest one
-    found. smallest: that pair where it is nearest (None: no pair), and when. contacts: the pairs
-    with a safety distance of their own, where they are nearest. path_length [m] of the tcp.
+    found, 1e-4 m where that lasts. smallest: that pair where it is nearest (None: no pair), and
+    when. contacts: the pairs with a safety distance of their own, where they are nearest.
+    path_length [m] of the tcp.
     """
 
     times: FloatArray
@@ -148,7 +153,8 @@ def _nearest_between(
     time = _zoomed(trajectory, scene, offset, times[_local_minima(distances)], step)
     near = scene.collision.min_distance(motion_at(trajectory, np.array([time])).q, offset)
     coefficients, durations = trajectory.coefficients()
-    tight = _TIGHT
+    lasting = np.mean(distances <= near.distance[0] + _TIGHT)
+    tight = _TIGHT_FOR_LONG if lasting > _LONG else _TIGHT
     for _ in range(_PROOFS):
         level = float(near.distance[0]) - tight
         if near.pair[0] < 0 or len(durations) == 0:
