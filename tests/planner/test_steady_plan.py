@@ -76,13 +76,14 @@ def test_bars_of_a_machine_are_its_work_and_no_more_parts_than_it_works_on() -> 
     plan = roomy_at(45.0)
     assert plan.cycle is not None
     bars = machine_bars(plan)
-    for name, capacity in (("lathe", 2), ("washer", 1), ("gauge", 1)):
-        seconds = CELL.machine(name).process
-        worked = sum(length for _, length in bars[name])
-        assert worked == pytest.approx(plan.cycle.units * seconds)
+    assert set(bars) == {"lathe.1", "lathe.2", "washer", "gauge"}
+    for name, own in bars.items():
+        machine = name.partition(".")[0]
+        parts = 1 if machine == "lathe" else 2
+        worked = sum(length for _, length in own)
+        assert worked == pytest.approx(parts * CELL.machine(machine).process)
         for moment in np.linspace(0.0, plan.cycle.period, 500):
-            working = sum(begin < moment < begin + length for begin, length in bars[name])
-            assert working <= capacity
+            assert sum(begin < moment < begin + length for begin, length in own) <= 1
 
 
 @pytest.fixture

@@ -33,7 +33,13 @@ from ir_planner.flexible.columns import (
     planned_columns,
 )
 from ir_planner.flexible.cycle_steps import CycleSaving, CycleSteps
-from ir_planner.flexible.tending_cell import held_from, machines_of, route_of, without_cycle
+from ir_planner.flexible.tending_cell import (
+    held_from,
+    machines_of,
+    route_of,
+    slot_name,
+    without_cycle,
+)
 from ir_planner.presentation import plot_cycle, plot_throughputs
 from ir_planner.program import (
     ACROSS,
@@ -187,27 +193,31 @@ def robot_bars(plan: SteadyPlan) -> tuple[tuple[str, float, float, str], ...]:
 
 
 def machine_bars(plan: SteadyPlan) -> dict[str, tuple[tuple[float, float], ...]]:
-    """When each machine works in the cycle: begin and length [s]; over its end it goes on at its
-    begin.
+    """When each machine works in the cycle, on the part in each of its slots: begin and length [s];
+    over its end it goes on at its begin.
     """
     assert plan.cycle is not None
     assert plan.problem is not None
     period = plan.cycle.period
     bars: dict[str, tuple[tuple[float, float], ...]] = {}
+    slots: dict[str, list[tuple[float, float]]]
     for place, seconds in enumerate(plan.process, 1):
         if seconds == 0.0:
             continue
-        pieces: list[tuple[float, float]] = []
+        most = plan.cycle.most[place - 1]
+        slots = {slot_name(plan.machines[place], k, most): [] for k in range(most)}
         queued = plan.cycle.queued(place - 1, seconds, plan.problem.capacity[place - 1])
         loads = [visit for visit in plan.cycle.visits if visit.activity == place - 1]
         for load in loads:
             begin = (load.start + load.seconds + queued[load.unit]) % period
+            slot = slot_name(plan.machines[place], plan.cycle.number(load), most)
+            pieces = slots[slot]
             left = seconds
             while left > 0.0:
                 pieces.append((begin, min(left, period - begin)))
                 left -= pieces[-1][1]
                 begin = 0.0
-        bars[plan.machines[place]] = tuple(pieces)
+        bars |= {slot: tuple(pieces) for slot, pieces in slots.items()}
     return bars
 
 

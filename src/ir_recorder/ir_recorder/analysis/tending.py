@@ -66,9 +66,14 @@ class MachineTimes:
     """
 
     name: str
-    slot: int
     working: tuple[Span, ...]
     finished: tuple[Span, ...]
+    slot: int = 0
+
+    @property
+    def label(self) -> str:
+        """The machine, with the slot where it holds several."""
+        return f"{self.name} {self.slot}" if self.slot else self.name
 
 
 @dataclass(frozen=True)
@@ -178,7 +183,7 @@ def _machines(cell: Cell, signals: Iterable[SignalChange], end: float) -> tuple[
         for number, (loaded, finished) in enumerate(slots, 1):
             working = tuple(Span(begun[span], span.end) for span in loaded)
             slot = number if len(slots) > 1 else 0
-            result.append(MachineTimes(name, slot, working, tuple(finished)))
+            result.append(MachineTimes(name, working, tuple(finished), slot))
     return tuple(result)
 
 
@@ -248,7 +253,7 @@ def planned_machines(cell: Cell, steps: Sequence[PlannedMovement]) -> tuple[Mach
     return tuple(
         _repeated(machine.name, machine.process, put[machine.name], taken[machine.name], period)
         for machine in cell.equipment
-        if machine.process > 0.0 and machine.capacity + machine.buffer == 1
+        if machine.process > 0.0 and machine.places == 1
         if machine.name in put and machine.name in taken
     )
 
@@ -272,7 +277,7 @@ def _repeated(
             working.append(Span(begin + shift, done + shift))
             if until > done:
                 finished.append(Span(done + shift, until + shift))
-    return MachineTimes(name, 0, tuple(working), tuple(finished))
+    return MachineTimes(name, tuple(working), tuple(finished))
 
 
 _CYCLES = 4  # of a part in a machine, at most

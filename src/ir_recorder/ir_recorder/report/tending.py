@@ -125,7 +125,7 @@ def _figure(part: PartRow, tending: Tending, power: PowerSeries | None) -> str:
     if power is not None:
         chart.lane("mode", mode_bars(power, part.span))
     for machine in tending.machines:
-        chart.lane(f"{machine.name} {machine.slot or ''}".strip(), _machine_bars(machine))
+        chart.lane(machine.label, _machine_bars(machine))
     if power is not None and len(power.time) > 1:
         chart.power([power])
     said = f"part {part.number}: {seconds(part.span.seconds)}, {watt_hours(part.joules)}"
