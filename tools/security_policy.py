@@ -119,7 +119,7 @@ LIVE = Rights(
     subscribe=(
         *(names.JOINT_STATES, names.POWER_STATE, names.CONTROLLER_STATE, names.PLC_INPUTS_IN_FORCE),
         *(names.PLC_OUTPUTS, names.CARRIED_LOAD, names.MACHINE_STATES, names.CONTACTS),
-        *(names.CELL, names.PLANNED_TRAJECTORY, names.PROGRAM_STATE),
+        *(names.CELL, names.PLANNED_TRAJECTORY, names.PROGRAM_STATE, names.STOP_NUMBER),
     ),
     request=(names.SET_PLC_INPUT, names.GET_TRAJECTORY),
 )
