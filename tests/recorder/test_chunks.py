@@ -12,7 +12,7 @@ from mcap.records import Chunk
 from mcap.writer import CompressionType, Writer
 
 from ir_recorder.errors import ReadError
-from ir_recorder.format.schemas import MOST_DEPTH, definitions_of
+from ir_recorder.format.schemas import MOST_DEPTH, MOST_TEXT, MOST_TYPES, definitions_of
 from ir_recorder.reading.chunk_limits import MOST_RECORDS, ChunkReader, ReadLimits
 from ir_recorder.reading.mcap_file import read_raw
 from ir_recorder.reading.reader import read_recording
@@ -124,6 +124,9 @@ def nested(depth: int) -> str:
         (nested(9), "more than 100000 fields"),
         ("string[4000000000] x\n", "more than 100000 fields"),
         ("int8[0] x\n", "no elements"),
+        (f"int8[{'9' * 5000}] x\n", "whose length has 5,000 digits"),
+        (nested(MOST_TYPES + 1).replace("[9]", "[]"), "more than 1,000 types"),
+        (f"int8 x\n#{' ' * MOST_TEXT}", "at most 524,288 are read"),
     ],
 )
 def test_a_definition_without_an_end_is_a_sentence(

@@ -6,8 +6,9 @@ import json
 import os
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from ir_recorder.errors import ReadError, SchemaError
@@ -31,9 +32,13 @@ _NUMBERS = (
 )
 TEXTS = ("string", "wstring")
 PRIMITIVES = frozenset(("bool", "byte", "char", *TEXTS, *_NUMBERS))
+MOST_TEXT = 1 << 19  # characters of a definition with all its types; those of ROS 2 have 20,000
+MOST_TYPES = 1_000  # of a definition; those of ROS 2 are built from some dozens
 MOST_DEPTH = 32  # types inside types; those of ROS 2 reach 6
 MOST_FIELDS = 100_000  # of one message without its sequences; those of ROS 2 reach some hundreds
 SEPARATOR = "=" * 80
+_MOST_DIGITS = 18  # of the length of an array
+_KEPT = 32  # definitions that are remembered; about as many topics are read
 _FIELD = re.compile(
     r"^(?P<type>[A-Za-z][\w/]*)(?:<=\d+)?(?P<array>\[[^\]]*\])?\s+"
     r"(?P<name>[a-z]\w*)(?P<rest>.*)$"
@@ -59,7 +64,7 @@ class Field:
 
 def fields_of(text: str, package: str) -> tuple[Field, ...]:
     """Fields of one .msg text; constants and comments are left out, types get their package's
-    name.
+    name. ReadError for an array whose length is no number that anything could have.
     """
     fields = []
     for line in text.splitlines():
@@ -74,13 +79,39 @@ def fields_of(text: str, package: str) -> tuple[Field, ...]:
     return tuple(fields)
 
 
-def definitions_of(name: str, text: str) -> dict[str, tuple[Field, ...]]:
+def definitions_of(name: str, text: str) -> Mapping[str, tuple[Field, ...]]:
     """All types of a concatenated schema: "package/Type" -> fields; `name` is that of the first
     ("pkg/msg/Type").
+
+    A text is read once, however many messages ask for it, in time that is proportional to its
+    length. ReadError for one that is longer, or built of more or deeper types, than is read.
     """
-    definitions = {}
-    head, *others = re.split(rf"^{SEPARATOR}\s*$", text, flags=re.MULTILINE)
-    definitions[short_name(name)] = fields_of(head, name.split("/", 1)[0])
+    definitions, refusal = _read_once(name, text)
+    if refusal:
+        raise ReadError(refusal)
+    return definitions
+
+
+@lru_cache(maxsize=_KEPT)
+def _read_once(name: str, text: str) -> tuple[Mapping[str, tuple[Field, ...]], str]:
+    """The types, and why they are refused, "" where they aren't."""
+    try:
+        return _read(name, text), ""
+    except ReadError as error:
+        return {}, str(error)
+
+
+def _read(name: str, text: str) -> Mapping[str, tuple[Field, ...]]:
+    if len(text) > MOST_TEXT:
+        raise ReadError(
+            f"the definition of {name[:80]} has {len(text):,} characters, at most {MOST_TEXT:,} "
+            "are read"
+        )
+    separator = rf"^{SEPARATOR}\s*$"
+    head, *others = re.split(separator, text, maxsplit=MOST_TYPES, flags=re.MULTILINE)
+    if len(others) >= MOST_TYPES:
+        raise ReadError(f"the definition of {name[:80]} has more than {MOST_TYPES:,} types")
+    definitions = {short_name(name): fields_of(head, name.split("/", 1)[0])}
     for section in others:
         title, _, body = section.lstrip("\n").partition("\n")
         own = short_name(title.removeprefix("MSG:").strip())
@@ -136,7 +167,11 @@ def _count(array: str | None) -> int | None:
     if array is None:
         return None
     inside = array[1:-1]
-    return int(inside) if inside.isdigit() else -1
+    if not (inside.isascii() and inside.isdigit()):
+        return -1
+    if len(inside) > _MOST_DIGITS:
+        raise ReadError(f"a definition has an array whose length has {len(inside):,} digits")
+    return int(inside)
 
 
 # Definitions of message types as a recording carries them, from the installed interface packages.

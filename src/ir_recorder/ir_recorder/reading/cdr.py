@@ -4,6 +4,9 @@ A topic at 500 Hz has messages of one layout: the offsets are found by walking t
 every field of all messages is one strided view. Messages of another layout (a longer text, an empty
 array) form their own group. Source: OMG CDR (XCDR1, little endian), alignment counted after the
 four bytes of the encapsulation header.
+
+Reading takes time and memory in proportion to the bytes, whatever their definition says: an element
+has at least one byte, a layout is walked once, and what is walked and compared is bounded.
 """
 
 from __future__ import annotations
@@ -26,11 +29,16 @@ _DTYPES = {"bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1"
 }
 _HEADER = 4  # bytes: encapsulation kind and options
 _LITTLE_ENDIAN = 1  # kind CDR_LE
-MOST_LAYOUTS = 2000  # each costs a pass over the messages left; a topic at a fixed rate has a few
+_ENCAPSULATION = 1  # place of the byte with the kind
+MOST_LAYOUTS = 2000  # a topic at a fixed rate has a few
+MOST_WALKED = 64 * 2**20  # bytes of the paths of a topic's values; a plan of 100,000 points has 50
+_VALUE = 32  # bytes that a value counts beside its path
+MOST_COMPARED = 1 << 30  # bytes of lengths that are compared, and beyond these
+MOST_PASSES = 20  # times the bytes of the messages
 _LENGTH = struct.Struct("<I")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class _Leaf:
     """Where a field stands in the bytes: `count` values of a dtype, or a text of `count` bytes."""
 
@@ -47,30 +55,78 @@ class _Layout:
     end: int  # of the last field
 
 
-class Columns:
-    """Fields of N messages by path ("header.stamp.sec", "position")."""
+class _Budget:
+    """What may be done for the messages of a topic; ReadError with the sentence beyond that."""
 
-    def __init__(self, messages: Sequence[bytes], type_name: str, schema: str) -> None:
+    def __init__(self, most: int, sentence: str) -> None:
+        self._left = most
+        self._sentence = sentence
+
+    def spend(self, amount: int) -> None:
+        """Do so much."""
+        self._left -= amount
+        if self._left < 0:
+            raise ReadError(self._sentence)
+
+
+class _UnfitError(ReadError):
+    """A message that doesn't fit its definition; lengths: offsets of the words that decided it."""
+
+    def __init__(self, sentence: str, lengths: Sequence[int]) -> None:
+        super().__init__(sentence)
+        self.lengths = lengths
+
+
+class Columns:
+    """Fields of N messages by path ("header.stamp.sec", "position").
+
+    unfit: gets the rows that don't fit their definition, which lack all fields then; None: they are
+    a ReadError, as are messages of too many values or layouts.
+    """
+
+    def __init__(
+        self,
+        messages: Sequence[bytes],
+        type_name: str,
+        schema: str,
+        unfit: list[int] | None = None,
+    ) -> None:
         definitions = definitions_of(type_name, schema)
         self.count = len(messages)
         self._groups: list[tuple[IntArray, NDArray[np.uint8], _Layout]] = []
         sizes = np.array([len(message) for message in messages], dtype=np.int64)
-        if self.count and sizes.min() < _HEADER:
-            raise ReadError(f"a message has {sizes.min()} bytes, CDR begins with {_HEADER}")
-        for size in np.unique(sizes):
-            open_rows = np.flatnonzero(sizes == size)
-            block = np.frombuffer(
-                b"".join(messages[int(i)] for i in open_rows), dtype=np.uint8
-            ).reshape(-1, size)
-            while len(open_rows):
-                if len(self._groups) == MOST_LAYOUTS:
+        walked = _Budget(
+            MOST_WALKED,
+            f"its messages have too many values: more than {MOST_WALKED:,} bytes of their paths",
+        )
+        compared = _Budget(
+            MOST_COMPARED + MOST_PASSES * int(sizes.sum()),
+            f"its messages have too many layouts for {MOST_PASSES} passes over them",
+        )
+        order = np.argsort(sizes, kind="stable")
+        for rows in np.split(order, np.flatnonzero(np.diff(sizes[order])) + 1):
+            joined = b"".join(messages[int(i)] for i in rows)
+            block = np.frombuffer(joined, dtype=np.uint8).reshape(len(rows), sizes[rows[:1]].sum())
+            left = np.arange(len(rows))
+            while len(left):
+                layout: _Layout | None = None
+                try:
+                    layout = _layout(bytes(block[left[0]]), definitions, type_name, walked)
+                    lengths = layout.lengths
+                except _UnfitError as error:
+                    if unfit is None:
+                        raise
+                    lengths = tuple(error.lengths)
+                same = _alike(block, left, lengths, compared)
+                members = left[same]
+                left = left[~same]
+                if layout is None:
+                    unfit += rows[members].tolist()
+                elif len(self._groups) == MOST_LAYOUTS:
                     raise ReadError(f"its messages have more than {MOST_LAYOUTS} different layouts")
-                layout = _layout(bytes(block[0]), definitions, short_name(type_name))
-                words = [o + k for o in layout.lengths for k in range(4)]
-                same = (block[:, words] == block[0, words]).all(axis=1)
-                self._groups.append((open_rows[same], block[same], layout))
-                open_rows = open_rows[~same]
-                block = block[~same]
+                else:
+                    own = block if len(members) == len(block) else block[members]
+                    self._groups.append((rows[members], own, layout))
 
     def numbers(self, path: str, width: int | None = None) -> FloatArray:
         """A numeric field as (N,), or (N, width) for an array; missing values are NaN."""
@@ -200,25 +256,13 @@ def by_name(columns: Columns, names: Sequence[str], *paths: str) -> list[FloatAr
 
 
 def fitting(messages: Sequence[bytes], type_name: str, schema: str) -> list[int]:
-    """Rows of the messages that fit the definition of their type."""
-    sizes: dict[int, list[int]] = {}
-    for row, message in enumerate(messages):
-        sizes.setdefault(len(message), []).append(row)
-    kept: list[int] = []
-    for rows in sizes.values():
-        if _fit([messages[row] for row in rows], type_name, schema):
-            kept += rows
-        else:
-            kept += [row for row in rows if _fit([messages[row]], type_name, schema)]
-    return sorted(kept)
-
-
-def _fit(messages: Sequence[bytes], type_name: str, schema: str) -> bool:
-    try:
-        Columns(messages, type_name, schema)
-    except ReadError:
-        return False
-    return True
+    """Rows of the messages that fit the definition of their type. Raises ReadError where the
+    definition or the number of values or layouts is more than is read.
+    """
+    unfit: list[int] = []
+    Columns(messages, type_name, schema, unfit)
+    left_out = set(unfit)
+    return [row for row in range(len(messages)) if row not in left_out]
 
 
 def _check_kind(leaf: _Leaf, numeric: bool) -> None:
@@ -233,33 +277,63 @@ def _values(block: NDArray[np.uint8], leaf: _Leaf) -> NDArray[np.generic]:
     return part.view(dtype).reshape(len(block), leaf.count)
 
 
-def _layout(data: bytes, definitions: dict[str, tuple[Field, ...]], name: str) -> _Layout:
-    walker = _Walker(data, definitions)
+def _alike(
+    block: NDArray[np.uint8], rows: IntArray, lengths: Sequence[int], compared: _Budget
+) -> NDArray[np.bool_]:
+    """Which of the rows (N,) of a block (M, size) have the first one's words at these offsets, and
+    its kind: their layout is the same.
+    """
+    size = block.shape[1]
+    places = np.array(
+        [at for at in (_ENCAPSULATION, *(o + k for o in lengths for k in range(4))) if at < size],
+        dtype=np.int64,
+    )
+    compared.spend(len(rows) * len(places))
+    words = block[np.ix_(rows, places)]
+    alike: NDArray[np.bool_] = (words == words[0]).all(axis=1)
+    return alike
+
+
+def _layout(
+    data: bytes, definitions: Mapping[str, tuple[Field, ...]], type_name: str, walked: _Budget
+) -> _Layout:
+    walker = _Walker(data, definitions, walked)
+    name = short_name(type_name)
+    if len(data) < _HEADER:
+        raise _UnfitError(f"a message has {len(data)} bytes, CDR begins with {_HEADER}", ())
+    if data[_ENCAPSULATION] != _LITTLE_ENDIAN:
+        raise _UnfitError("a message isn't little-endian CDR", ())
     try:
         walker.structure(name, "")
     except (struct.error, KeyError) as error:
-        raise ReadError(
-            f"a message of type {name} with {len(data)} bytes doesn't fit its definition: {error!r}"
+        raise _UnfitError(
+            f"a message of type {name} with {len(data)} bytes doesn't fit its definition: "
+            f"{error!r}",
+            walker.lengths,
         ) from error
     return _Layout(walker.leaves, tuple(walker.lengths), walker.at)
 
 
 class _Walker:
-    """Goes through one message and notes where its fields stand."""
+    """Goes through one message and notes where its fields stand; an element of it takes at least a
+    byte of the message, and `walked` is told of each.
+    """
 
-    def __init__(self, data: bytes, definitions: dict[str, tuple[Field, ...]]) -> None:
-        if len(data) < _HEADER or data[1] != _LITTLE_ENDIAN:
-            raise ReadError("a message isn't little-endian CDR")
+    def __init__(
+        self, data: bytes, definitions: Mapping[str, tuple[Field, ...]], walked: _Budget
+    ) -> None:
         self._data = data
         self._definitions = definitions
+        self._walked = walked
         self.at = _HEADER
         self.leaves: dict[str, _Leaf] = {}
         self.lengths: list[int] = []
 
     def structure(self, name: str, prefix: str) -> None:
         fields = self._definitions[name]
+        self._walked.spend(len(prefix) + _VALUE)
         if not fields:
-            self.at += 1  # an empty structure has one byte in CDR
+            self._advance(1)  # an empty structure has one byte in CDR
         for field in fields:
             path = f"{prefix}{field.name}"
             count = 1 if field.count is None else field.count
@@ -279,12 +353,16 @@ class _Walker:
         size = np.dtype(dtype).itemsize
         if count:
             self._align(size)
-        self.leaves[path] = _Leaf(path, dtype, self.at, count)
+        self._note(_Leaf(path, dtype, self.at, count))
         self._advance(size * count)
+
+    def _note(self, leaf: _Leaf) -> None:
+        self._walked.spend(len(leaf.path) + _VALUE)
+        self.leaves[leaf.path] = leaf
 
     def _text(self, path: str) -> None:
         length = self._length()
-        self.leaves[path] = _Leaf(path, "", self.at, length)
+        self._note(_Leaf(path, "", self.at, length))
         self._advance(length)
 
     def _length(self) -> int:

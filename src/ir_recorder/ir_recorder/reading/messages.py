@@ -14,14 +14,18 @@ from mcap_ros2.decoder import DecoderFactory
 from ir_msgs_py.report import DistancePair, PlannedMovement, TrajectoryReport
 from ir_msgs_py.savings import ProgramSavings, Saving
 from ir_recorder.format.schemas import definitions_of
+from ir_recorder.reading.cdr import Columns
 from ir_recorder.reading.mcap_file import RawChannel
 from ir_values.arrays import FloatArray
+
+_LONG = 1 << 16  # bytes of a message whose values are counted before it is decoded
 
 
 def decoder_of(channel: RawChannel) -> Callable[[bytes], Any] | None:
     """What decodes the channel's messages, None where nothing does; raises nearly anything for a
     damaged schema. The library prints what it can't read, which may be anything: that stays out of
-    the terminal.
+    the terminal. A long message of more values than `Columns` reads is a ReadError, before each of
+    them takes an object.
     """
     schema = Schema(1, channel.schema_text.encode(), channel.schema_encoding, channel.type)
     definitions_of(channel.type, channel.schema_text)
@@ -29,7 +33,15 @@ def decoder_of(channel: RawChannel) -> Callable[[bytes], Any] | None:
         decode: Callable[[bytes], Any] | None = DecoderFactory().decoder_for(
             channel.message_encoding, schema
         )
-    return decode
+    if decode is None:
+        return None
+
+    def decoded(data: bytes) -> Any:
+        if len(data) > _LONG:
+            Columns([data], channel.type, channel.schema_text)
+        return decode(data)
+
+    return decoded
 
 
 def movement_from(message: Any) -> PlannedMovement:
