@@ -4,6 +4,7 @@ crash, never slower because more speed is asked for.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -218,3 +219,19 @@ def test_asking_for_more_speed_never_takes_longer(planner: Planner, seeds: range
         ]
         assert np.diff(durations).max() <= 2e-9, (seed, speeds, durations)
         assert min(durations) > 0.0
+
+
+def test_a_path_that_is_late_is_answered_by_the_first_speed_that_was_begun(
+    planner: Planner,
+) -> None:
+    late = Planner("open", clock=itertools.count(0.0, 10.0).__next__)
+    for seed in range(3):
+        path = stairs(seed)
+        speeds = []
+        for each in (planner, late):
+            plan = each.plan_cartesian(path)
+            assert plan.report.certified, (seed, plan.status.message)
+            assert plan.info.truncated == (each is late)
+            speeds.append(sum(stage.name == "proof" for stage in plan.info.stages))
+        assert speeds[1] <= speeds[0], seed
+        assert speeds[1] == 1, seed

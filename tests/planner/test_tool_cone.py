@@ -228,6 +228,7 @@ def test_the_tool_leans_no_farther_out_of_a_machine_and_into_it(cell: str, direc
             assert plan.status.ok, plan.status.message
             for candidate in plan.candidates:
                 assert candidate.report.certified
+                assert candidate.trajectory is not None
                 axis = judge.rotation(candidate.work).T @ UP
                 seen = judge.largest(candidate.trajectory, axis, UP)
                 assert seen <= min(most, candidate.report.largest_tilt) + TOLERANCE
@@ -240,7 +241,7 @@ def test_a_tool_that_leans_too_far_at_a_station_is_refused() -> None:
         ("entry", StatusCode.GOAL_VIOLATES_PATH_CONSTRAINTS),
     ):
         plan = planner.plan_service(
-            "cnc", direction=direction, tilt_max=0.1, tilt_axis=[1.0, 0.0, 0.0]
+            "cnc", direction=direction, tilt_max=0.1, tilt_axis=(1.0, 0.0, 0.0)
         )
         assert plan.status.code == code
         assert "at cnc" in plan.status.message
