@@ -249,8 +249,8 @@ def live() -> Iterator[tuple[LiveServer, Stream, list[tuple[str, bool]]]]:
     view = CellView()
     robot = load_cell("demo").robot
 
-    def press(name: str, value: bool) -> ButtonAnswer:
-        pressed.append((name, value))
+    def press(name: str, value: dict[str, Any]) -> ButtonAnswer:
+        pressed.append((name, value["level"]))
         return ButtonAnswer(False, EVIL)
 
     server = LiveServer(stream, press, lambda: view.scene)
