@@ -5,6 +5,7 @@ ahead.
 from __future__ import annotations
 
 import threading
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -13,14 +14,18 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, UInt64
 
 from ir_description import load_cell
 from ir_msgs.action import ExecuteTrajectory
+from ir_msgs.msg import PlcInputs
+from ir_msgs.srv import SetPlcInput
 from ir_msgs_py import names
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.node_process import heed_times_only
 from ir_msgs_py.ros.testing import PATIENCE
+from ir_msgs_py.ros.topics import LATCHED
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.node import SimDriver
 
@@ -28,6 +33,7 @@ NS = 1_000_000_000
 PERIOD = 2_000_000
 # messages that wait for a listener; beyond 5,000 within a process Fast DDS gives no more, ever
 DEPTH = 4_000
+TOLD = 30.0  # s; on a busy machine
 TICK = 5_000_000  # ns of real time between two messages of the clock
 # of its speed, while the plant of a busy machine is a second behind; at five the grid begins anew
 CREEP = 0.01
@@ -164,6 +170,36 @@ def test_a_frozen_clock_freezes_the_plant_and_nothing_is_skipped_after(
     wait_for(lambda: len(stamps) > count + 100)
     assert set(gaps(stamps)) == {PERIOD}
     assert client.execute(movement(), timeout=PATIENCE).energy > 0.0
+
+
+def test_a_press_is_told_at_once_while_the_clock_stands(
+    driver, ros_node, ros_executor, client, clock, stamps, wait_for
+):
+    told = {}
+    for kind, name in (
+        (UInt64, names.STOP_NUMBER),
+        (Bool, names.STOP_LATCHED),
+        (PlcInputs, names.PLC_INPUTS_IN_FORCE),
+    ):
+        hear = partial(told.__setitem__, name)
+        ros_executor.run(
+            lambda kind=kind, name=name, hear=hear: ros_node.create_subscription(
+                kind, f"/{name}", hear, LATCHED
+            )
+        )
+    clock.start(50 * NS)
+    wait_for(lambda: len(stamps) > 100 and len(told) == 3)
+    frozen = clock.run_at(0.0)
+    wait_for(lambda: stamps[-1] + PERIOD > frozen)
+    before = told[names.STOP_NUMBER].data
+    count = len(stamps)
+    pressing = SetPlcInput.Request(name="emergency_stop", value=True)
+    assert client.call(names.SET_PLC_INPUT, pressing).inputs.emergency_stop
+    wait_for(lambda: told[names.STOP_NUMBER].data != before, timeout=TOLD, what="its number")
+    wait_for(lambda: told[names.STOP_LATCHED].data, timeout=TOLD, what="it is latched")
+    in_force = names.PLC_INPUTS_IN_FORCE
+    wait_for(lambda: told[in_force].emergency_stop, timeout=TOLD, what="it is in force")
+    assert len(stamps) == count
 
 
 @pytest.mark.parametrize(("jump", "where"), [(-20, "back"), (100, "ahead")])

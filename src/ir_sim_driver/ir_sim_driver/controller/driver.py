@@ -284,6 +284,12 @@ class Driver:
         return self._simulation.stop_number
 
     @property
+    def inputs_in_force(self) -> PlcInputs | None:
+        """The levels that count, whoever set them; None while the controller is off the network."""
+        simulation = self._simulation
+        return simulation.plc.in_force if simulation.on_the_network else None
+
+    @property
     def stamp_ns(self) -> int:
         """Stamp [ns] of the present tick."""
         return self._stamp

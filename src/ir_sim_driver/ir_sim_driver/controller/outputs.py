@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ir_msgs_py.modes import Mode, PowerState
-from ir_msgs_py.plc import PlcInputs, PlcOutputs
+from ir_msgs_py.plc import PlcOutputs
 from ir_sim_driver.controller.simulation import Simulation
 from ir_sim_driver.load_check import LoadFinding
 from ir_sim_driver.motion import Following
@@ -42,8 +42,7 @@ class Joints:
 class Frame:
     """What is published at the stamp of `joints`; None: nothing of it now.
 
-    load: what is carried. inputs: the levels that count, when they have changed, whoever set them.
-    load_check: of a movement that has ended. stop_number: of the last stop; stopped: it is latched.
+    load: what is carried. load_check: of a movement that has ended.
     """
 
     joints: Joints
@@ -51,10 +50,7 @@ class Frame:
     power: PowerState | None
     following: Following | None
     outputs: PlcOutputs | None
-    inputs: PlcInputs | None = None
     load_check: LoadFinding | None = None
-    stop_number: int = 0
-    stopped: bool = False
 
 
 class FrameMaker:
@@ -64,7 +60,6 @@ class FrameMaker:
         self._simulation = simulation
         self._steps = steps
         self._outputs: PlcOutputs | None = None
-        self._inputs: PlcInputs | None = None
         self._energy = 0.0
         self._dissipated = 0.0
         self._rectified = 0.0
@@ -91,25 +86,11 @@ class FrameMaker:
                 self._outputs = present
                 outputs = present
         if joints.q is None:
-            return Frame(
-                joints,
-                simulation.load,
-                power,
-                None,
-                outputs,
-                stop_number=simulation.stop_number,
-                stopped=simulation.stopped,
-            )
+            return Frame(joints, simulation.load, power, None, outputs)
         if simulation.steps % CONTROLLER_PERIOD < self._steps:
             following = simulation.executor.following(backend.q, backend.qd)
-        levels = simulation.plc.levels
-        inputs = None if levels is self._inputs or levels == self._inputs else levels
-        self._inputs = inputs or self._inputs
         finding = simulation.load_checks.take()
-        load = simulation.load
-        number = simulation.stop_number
-        stopped = simulation.stopped
-        return Frame(joints, load, power, following, outputs, inputs, finding, number, stopped)
+        return Frame(joints, simulation.load, power, following, outputs, finding)
 
     def _power(self, stamp_ns: int) -> PowerState:
         simulation = self._simulation

@@ -50,7 +50,7 @@ from ir_sim_driver.node.presses import (
 )
 from ir_sim_driver.node.real_time import FOREIGN, OWN, SYSTEM, GridThread, ScaledClock
 from ir_sim_driver.node.services import DriverServices
-from ir_sim_driver.node.topics import Streams, TrajectoryTopic
+from ir_sim_driver.node.topics import StopTopics, Streams, TrajectoryTopic
 from ir_sim_driver.node.trajectory_actions import Admission, BoundedActionServer, Executions
 from ir_sim_driver.node.visualization import RobotMarkers, open_transforms
 from ir_sim_driver.notices import Level, Notice, shortened
@@ -146,6 +146,7 @@ class SimDriver(Node):
 
     def _open_topics(self) -> None:
         self._streams = Streams(self, self._driver.joint_names)
+        self._stop_topics = StopTopics(self, self._driver)
         self._markers = self.create_publisher(MarkerArray, own(names.ROBOT_MARKERS), 1)
         self._robot = RobotMarkers((), ())
         self._diagnostics = Diagnostics(self)
@@ -188,7 +189,9 @@ class SimDriver(Node):
         )
         self._recoveries = PolledService(self, Recover, own(names.RECOVER), self._recover, self)
         self._threads = (
-            CommandThread("presses", PlcTopic(self, self._driver, self._presses).poll),
+            CommandThread(
+                "presses", PlcTopic(self, self._driver, self._presses).poll, self._tell_stop
+            ),
             CommandThread(
                 "requests",
                 self._inputs.poll,
@@ -224,6 +227,13 @@ class SimDriver(Node):
         executions.admission_of = server.admission_of
         executions.client_of = server.client_of
         return server
+
+    def _tell_stop(self) -> int:
+        """Tell of a press, by whichever way it came, while the plant's thread has no stamp to
+        take.
+        """
+        self._stop_topics.tell()
+        return 0
 
     def _refuse_waiting(self) -> bool:
         """After a stop, take goals that wait for a busy executor, so that they are refused and none
@@ -319,6 +329,7 @@ class SimDriver(Node):
 
     def _tick(self, stamp_ns: int) -> None:
         frame = self._driver.tick(stamp_ns, self._publish_joints)
+        self._stop_topics.tell()
         self._streams.publish(frame)
         self._announcements.watch(frame.load)
 

@@ -5,6 +5,7 @@ publishes, joint states at every stamp and first, the rest when it is due.
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Sequence
 
 from rclpy.node import Node
@@ -17,6 +18,7 @@ from trajectory_msgs.msg import JointTrajectory
 from ir_msgs.msg import ControllerState, LoadCheck, PlcInputs, PlcOutputs, PowerState
 from ir_msgs_py import names
 from ir_msgs_py.names import own
+from ir_msgs_py.plc import PlcInputs as Levels
 from ir_msgs_py.ros.conversions import time_to_msg
 from ir_msgs_py.ros.power_conversions import (
     plc_inputs_to_msg,
@@ -101,6 +103,38 @@ _STREAM = QoSProfile(depth=2000)
 _CLOCK_RATE = 125
 
 
+class StopTopics:
+    """Tells of the last stop, and of the PLC's levels in force, as soon as they have changed,
+    whoever notices it first: also while the clock of the plant stands.
+    """
+
+    def __init__(self, node: Node, driver: Driver) -> None:
+        self._driver = driver
+        self._stop_numbers = node.create_publisher(UInt64, own(names.STOP_NUMBER), LATCHED)
+        self._stop_latched = node.create_publisher(Bool, own(names.STOP_LATCHED), LATCHED)
+        self._in_force = node.create_publisher(PlcInputs, own(names.PLC_INPUTS_IN_FORCE), LATCHED)
+        self._telling = threading.Lock()  # what is newer is told later
+        self._number = -1
+        self._stopped: bool | None = None
+        self._inputs: Levels | None = None
+
+    def tell(self) -> None:
+        """Publish what has changed; any thread may call it."""
+        with self._telling:
+            number = self._driver.stop_number
+            if number != self._number:
+                self._number = number
+                self._stop_numbers.publish(UInt64(data=number))
+            stopped = self._driver.stopped
+            if stopped is not self._stopped:
+                self._stopped = stopped
+                self._stop_latched.publish(Bool(data=stopped))
+            inputs = self._driver.inputs_in_force
+            if inputs is not None and inputs != self._inputs:
+                self._inputs = inputs
+                self._in_force.publish(plc_inputs_to_msg(inputs))
+
+
 class Streams:
     """Publishers of `node` for frames of the joints of these names."""
 
@@ -114,12 +148,7 @@ class Streams:
         )
         self._states_of_controllers = ControllerStates(node, joint_names, _STREAM)
         self._load_checks = node.create_publisher(LoadCheck, own(names.LOAD_CHECK), LATCHED)
-        self._stop_numbers = node.create_publisher(UInt64, own(names.STOP_NUMBER), LATCHED)
-        self._stop_latched = node.create_publisher(Bool, own(names.STOP_LATCHED), LATCHED)
-        self._stop_number = -1
-        self._stopped: bool | None = None
         self._outputs = node.create_publisher(PlcOutputs, own(names.PLC_OUTPUTS), LATCHED)
-        self._in_force = node.create_publisher(PlcInputs, own(names.PLC_INPUTS_IN_FORCE), LATCHED)
         self._joint_state = JointState(name=list(joint_names))
         self._joint_state.header.frame_id = names.BASE_FRAME
         self._clock = None
@@ -144,12 +173,6 @@ class Streams:
     def publish(self, frame: Frame) -> None:
         """Publish what the frame holds beside its joints."""
         stamp_ns = frame.joints.stamp_ns
-        if frame.stop_number != self._stop_number:
-            self._stop_number = frame.stop_number
-            self._stop_numbers.publish(UInt64(data=frame.stop_number))
-        if frame.stopped is not self._stopped:
-            self._stopped = frame.stopped
-            self._stop_latched.publish(Bool(data=frame.stopped))
         if frame.power is not None:
             self._power_states.publish(power_state_to_msg(frame.power))
         if frame.following is not None:
@@ -165,5 +188,3 @@ class Streams:
             msg = LoadCheck()
             fill_load_check(msg, stamp_ns, frame.load_check)
             self._load_checks.publish(msg)
-        if frame.inputs is not None:
-            self._in_force.publish(plc_inputs_to_msg(frame.inputs))

@@ -221,6 +221,13 @@ class Plc:
         self._greeted = False
         self._judged: tuple[object, bool] = (None, False)
 
+    @property
+    def in_force(self) -> PlcInputs:
+        """The levels that count; a pressed emergency stop does before the next step."""
+        if self.raw.emergency_stop and not self.levels.emergency_stop:
+            return self.levels.with_bit(STOP_BIT, True)
+        return self.levels
+
     def write(
         self, writer: str, levels: Mapping[str, bool], client: str = "", came_ns: int = 0
     ) -> None:
