@@ -97,6 +97,7 @@ REQUESTS: dict[str, Any] = {
     "optimize_trajectory": srv.OptimizeTrajectory.Request(trajectory=line(), options=QUICK),
     "plan_program": srv.PlanProgram.Request(stations=["home"], savings=False, options=QUICK),
     "plan_steady_cycle": srv.PlanSteadyCycle.Request(savings=False, options=QUICK),
+    "plan_robots": srv.PlanRobots.Request(cell_file="open", options=QUICK),
 }
 RESPONSES = {
     name: getattr(srv, type(request).__name__.split("_")[0]).Response
@@ -107,6 +108,7 @@ EXPECTED = {
     "get_trajectory": Status.INVALID_OBJECT_NAME,
     "get_program": Status.INVALID_OBJECT_NAME,
     "plan_steady_cycle": Status.INVALID_GOAL_CONSTRAINTS,  # the demonstration has no route
+    "plan_robots": Status.INVALID_GOAL_CONSTRAINTS,  # it has one robot
 }
 """Codes of requests that make sense and yet are no success in the demonstration cell."""
 

@@ -53,6 +53,7 @@ EXPECTED: dict[str, tuple[int, str]] = {
     "PlanCartesianMovement": (Status.SUCCESS, ""),
     "PlanProgram": (Status.SUCCESS, ""),
     "PlanSteadyCycle": (Status.INVALID_GOAL_CONSTRAINTS, "cell demo has no route"),
+    "PlanRobots": (Status.SUCCESS, ""),
     "PlanStandby": (Status.SUCCESS, ""),
     "EvaluateTrajectory": (Status.INVALID_OBJECT_NAME, UNKNOWN),
     "GetTrajectory": (Status.INVALID_OBJECT_NAME, UNKNOWN),

@@ -288,13 +288,32 @@ def read_cell_apart(text: str, name_or_path: str) -> Cell:
     Raises what cell_from_yaml and load_cell raise, and CellFileError where it takes too much to
     read.
     """
-    if text and len(text) <= CHARACTERS_HERE:
-        return cell_from_yaml(text)
-    if name_or_path in bundled_cells():
-        return load_cell(name_or_path)
+    cell = _read_apart(text, name_or_path, several=False)
+    assert isinstance(cell, Cell)
+    return cell
+
+
+def read_robot_cells_apart(text: str, name_or_path: str) -> RobotCells | None:
+    """The same of the cells of all robots; None: the cell has one robot."""
+    cells = _read_apart(text, name_or_path, several=True)
+    assert not isinstance(cells, Cell)
+    return cells
+
+
+def _read_here(text: str, name_or_path: str, *, several: bool) -> Cell | RobotCells | None:
+    if several:
+        source = (text, "<text>", load_robot, None) if text else _cell_text(name_or_path)
+        return read_robot_cells(*source)
+    return cell_from_yaml(text) if text else load_cell(name_or_path)
+
+
+def _read_apart(text: str, name_or_path: str, *, several: bool) -> Cell | RobotCells | None:
+    quick = 0 < len(text) <= CHARACTERS_HERE
+    if quick or (not text and name_or_path in (*bundled_cells(), *bundled_robot_cells())):
+        return _read_here(text, name_or_path, several=several)
     process = subprocess.run(
         [sys.executable, "-c", f"from {__name__} import main; main()"],
-        input=pickle.dumps((text, name_or_path)),
+        input=pickle.dumps((text, name_or_path, several)),
         capture_output=True,
     )
     if process.returncode != 0:
@@ -302,8 +321,8 @@ def read_cell_apart(text: str, name_or_path: str) -> Cell:
     answer = pickle.loads(process.stdout)  # written by this module's main
     if isinstance(answer, DescriptionError):
         raise answer
-    cell: Cell = answer
-    return cell
+    read: Cell | RobotCells | None = answer
+    return read
 
 
 def _failure(process: subprocess.CompletedProcess[bytes]) -> str:
@@ -322,16 +341,16 @@ def main() -> None:
     most = math.ceil(used.ru_utime + used.ru_stime) + PROCESSOR_SECONDS
     resource.setrlimit(resource.RLIMIT_CPU, (most, most))
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
-    text, name_or_path = pickle.load(sys.stdin.buffer)
-    answer: Cell | DescriptionError
+    text, name_or_path, several = pickle.load(sys.stdin.buffer)
+    answer: Cell | RobotCells | DescriptionError | None
     try:
-        answer = cell_from_yaml(text) if text else load_cell(name_or_path)
+        answer = _read_here(text, name_or_path, several=several)
     except DescriptionError as error:
         answer = error
     sys.stdout.buffer.write(pickled(answer))
 
 
-def pickled(value: Cell | DescriptionError) -> bytes:
+def pickled(value: Cell | RobotCells | DescriptionError | None) -> bytes:
     """The value as bytes from which its arrays come back read-only, and a bundled robot as the one
     object.
     """

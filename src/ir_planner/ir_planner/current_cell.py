@@ -71,6 +71,16 @@ def read_cell_here(cell_yaml: str, cell_file: str) -> Cell:
     return cell_from_yaml(cell_yaml) if cell_yaml else load_cell(cell_file)
 
 
+def exactly_one(cell_yaml: str, cell_file: str) -> None:
+    """Raise RequestError unless either the text of a cell or its file is given."""
+    if bool(cell_yaml) == bool(cell_file):
+        given = "both are" if cell_yaml else "neither is"
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"exactly one of cell_yaml and cell_file must be given, {given}",
+        )
+
+
 class CurrentCell:
     """Holds one immutable cell after the other; a scene that was taken never changes.
 
@@ -117,12 +127,7 @@ class CurrentCell:
         Raises RequestError where not exactly one is given, DescriptionError for what is wrong with
         the cell.
         """
-        if bool(cell_yaml) == bool(cell_file):
-            given = "both are" if cell_yaml else "neither is"
-            raise RequestError(
-                StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"exactly one of cell_yaml and cell_file must be given, {given}",
-            )
+        exactly_one(cell_yaml, cell_file)
         with self._changing:
             return self._replaced_by(self._read(cell_yaml, cell_file))
 

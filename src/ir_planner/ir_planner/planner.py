@@ -111,6 +111,9 @@ tcp in the cell."""
 AnyPath = CartesianPath | CellPath  # a cell's own comes with what it allows to touch
 Cancelled = Callable[[], bool]
 _START = StatusCode.START_STATE_INVALID
+CLOCK: Clock = time.monotonic
+"""What ceilings of time are held against where nobody gives another clock."""
+
 _NEVER: Cancelled = lambda: False  # noqa: E731 - a default argument
 MARGIN = 0.02  # m: S_m where a request names none, as in the messages
 
@@ -175,7 +178,7 @@ class Planner:
         *,
         settings: PlannerSettings | None = None,
         power: PowerData | None = None,
-        clock: Clock = time.monotonic,
+        clock: Clock = CLOCK,
         read_cell: ReadCell = read_cell_here,
     ) -> None:
         self.clock = clock
@@ -601,7 +604,7 @@ class Planner:
         plan = program_in(plan, self._current.hash_of(cell), self.heard.source, spreads)
         for program in (*plan.front, plan.compared, plan):
             if program is not None and program.status.ok:
-                self._remember(program)
+                self.remember(program)
         return replace(plan, info=noted(plan.info, note))
 
     def plan_steady_cycle(
@@ -651,7 +654,7 @@ class Planner:
         """A program in the cell of its request with what it is certified by; it is stored."""
         spreads = Spreads(request)
         program = program_in(program, cell_hash(request.cell), self.heard.source, spreads)
-        self._remember(program)
+        self.remember(program)
         return program
 
     def _cycle_request(
@@ -708,7 +711,8 @@ class Planner:
             )
         return within_limits(q, self.cell, what, code)
 
-    def _remember(self, plan: ProgramPlan) -> None:
+    def remember(self, plan: ProgramPlan) -> None:
+        """Keep a program and its trajectories by their ids."""
         for movement in plan.movements:
             if movement.trajectory is not None:
                 self.trajectories.add(movement.trajectory)

@@ -8,6 +8,8 @@ from ir_description import Cell, Station, cell_to_yaml
 from ir_msgs.msg import AllowedContact as AllowedContactMsg
 from ir_msgs.msg import CyclePoint as CyclePointMsg
 from ir_msgs.msg import CycleStep as CycleStepMsg
+from ir_msgs.msg import RobotProgram as RobotProgramMsg
+from ir_msgs.msg import SharedZone as SharedZoneMsg
 from ir_msgs.msg import Station as StationMsg
 from ir_msgs_py.ros.conversions import (
     float_array,
@@ -37,6 +39,7 @@ from ir_planner.flexible import SteadyPlan, cycle_steps
 from ir_planner.krl import KrlExport
 from ir_planner.program import ProgramPlan, Standby
 from ir_planner.regional import EscapePlan, MovementPlan
+from ir_planner.robots import RobotsPlan
 from ir_planner.service import ServicePlan
 from ir_planner.state_queries import StatesCheck
 from ir_planner.store import StoredProgram
@@ -198,6 +201,45 @@ def fill_steady_cycle(response: Any, plan: SteadyPlan, include_points: bool) -> 
         )
         for point in plan.front
     ]
+
+
+def fill_robots(response: Any, plan: RobotsPlan, include_points: bool) -> None:
+    """plan_robots: a program for each robot."""
+    rows = zip(plan.robots, plan.programs, plan.leads, plan.begins, strict=False)
+    response.robots = [
+        RobotProgramMsg(
+            robot=robot,
+            program_id=program.program_id,
+            lead=[planned_movement_to_msg(lead, include_points)] if lead.duration > 0.0 else [],
+            movements=[
+                planned_movement_to_msg(movement, include_points) for movement in program.movements
+            ],
+            report=report_to_msg(program.report),
+            begin=begin,
+        )
+        for robot, program, lead, begin in rows
+    ]
+    response.zones = [
+        SharedZoneMsg(
+            signal=zone.signal,
+            turn=zone.turn,
+            first=zone.first,
+            robots=list(zone.robots),
+            from_movement=[first for first, _ in zone.movements],
+            to_movement=[last for _, last in zone.movements],
+            enter=list(zone.enter),
+            leave=list(zone.leave),
+        )
+        for zone in plan.zones
+    ]
+    response.period = plan.period
+    response.shortest_period = plan.fastest
+    response.energy = float(plan.joules)
+    response.full_speed = plan.full_speed
+    response.gap = plan.gap
+    response.peak_power = float(plan.peak_power)
+    response.proved = plan.proved
+    response.certified = plan.certified
 
 
 def _point(program: ProgramPlan) -> ProgramPoint:

@@ -40,6 +40,7 @@ from ir_msgs.srv import (
     PlanEscape,
     PlanProgram,
     PlanRegionalMovement,
+    PlanRobots,
     PlanServiceMovement,
     PlanStandby,
     PlanSteadyCycle,
@@ -160,6 +161,7 @@ class PlannerNode(Node):
             (OptimizeTrajectory, names.OPTIMIZE_TRAJECTORY, ask.optimize_trajectory),
             (PlanProgram, names.PLAN_PROGRAM, ask.plan_program),
             (PlanSteadyCycle, names.PLAN_STEADY_CYCLE, ask.plan_steady_cycle),
+            (PlanRobots, names.PLAN_ROBOTS, ask.plan_robots),
         ):
             BoundedService(self, kind, own(name), ask.guarded(handler), long, watching=True)
         self._action = RecordedActionServer(

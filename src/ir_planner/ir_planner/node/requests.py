@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ir_description import UnknownNameError, cell_to_yaml, is_path, robot_urdf
+from ir_description import RobotCells, UnknownNameError, cell_to_yaml, is_path, robot_urdf
+from ir_description.library import read_robot_cells_apart
 from ir_kernels import KernelError
 from ir_msgs.srv import (
     CheckState,
@@ -24,6 +25,7 @@ from ir_msgs.srv import (
     PlanEscape,
     PlanProgram,
     PlanRegionalMovement,
+    PlanRobots,
     PlanServiceMovement,
     PlanStandby,
     PlanSteadyCycle,
@@ -38,6 +40,7 @@ from ir_msgs_py.ros.serving import Gone, answered, unexpected
 from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner.current_cell import exactly_one
 from ir_planner.errors import CancelledError, PlannerError, RequestError
 from ir_planner.krl import export_krl, numbers_asked, one_movement
 from ir_planner.node.answers import (
@@ -49,6 +52,7 @@ from ir_planner.node.answers import (
     fill_movement,
     fill_optimization,
     fill_program,
+    fill_robots,
     fill_service,
     fill_standby,
     fill_state_check,
@@ -74,9 +78,10 @@ from ir_planner.node.inputs import (
 from ir_planner.planner import Planner
 from ir_planner.program import ProgramPlan, lengths_of
 from ir_planner.request import chosen
+from ir_planner.robots import plan_robots
 from ir_planner.service import ServicePlan
 from ir_values.arrays import FloatArray
-from ir_values.errors import IrError, PoseError
+from ir_values.errors import IrError, PoseError, shown
 
 _NEVER: Gone = lambda: False  # noqa: E731 - a default argument
 
@@ -149,11 +154,8 @@ class Requests:
         return callback
 
     def set_cell(self, request: SetCell.Request, response: SetCell.Response) -> Status:
-        """Another cell; a file must lie below the roots, whatever the request says."""
-        file = request.cell_file
-        if is_path(file):
-            file = str(self.planner.settings.file_roots.inside(file))
-        cell = self.planner.set_cell(file, text=request.cell_yaml)
+        """Another cell."""
+        cell = self.planner.set_cell(self._inside(request.cell_file), text=request.cell_yaml)
         response.cell_name = cell.name
         response.stations = stations_to_msg(cell)
         self.cell_changed()
@@ -402,6 +404,44 @@ class Requests:
         )
         fill_steady_cycle(response, plan, options.include_points)
         return plan.status
+
+    def plan_robots(
+        self,
+        request: PlanRobots.Request,
+        response: PlanRobots.Response,
+        cancelled: Gone = _NEVER,
+    ) -> Status:
+        """The cheapest joint cycle of a cell with several robots; the planner's cell stays."""
+        options = options_of(request.options, self.draw_seed)
+        plan = plan_robots(
+            self._robot_cells(request.cell_yaml, request.cell_file),
+            cycle_time=request.cycle_time,
+            peak_power=request.peak_power,
+            options=options,
+            settings=self.planner.settings,
+            cancelled=cancelled,
+            clock=self.planner.clock,
+        )
+        for program in plan.programs:
+            self.planner.remember(program)
+        fill_robots(response, plan, options.include_points)
+        return plan.status
+
+    def _robot_cells(self, text: str, file: str) -> RobotCells:
+        """The cells of all robots of a text or a file, which must lie below the roots."""
+        exactly_one(text, file)
+        cells = read_robot_cells_apart(text, self._inside(file))
+        if cells is None:
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                f"the cell {shown(file, 200) if file else 'of the text'} has one robot, so there "
+                "is no joint cycle: ask plan_program, or plan_steady_cycle where it has a route",
+            )
+        return cells
+
+    def _inside(self, file: str) -> str:
+        """A file as it may be read: a path must lie below the roots, whatever the request says."""
+        return str(self.planner.settings.file_roots.inside(file)) if is_path(file) else file
 
     def get_program(self, request: GetProgram.Request, response: GetProgram.Response) -> Status:
         """A program planned before."""

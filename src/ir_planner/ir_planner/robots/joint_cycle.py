@@ -9,7 +9,7 @@ duration of every movement on its convex curve, and how long and in which power 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,10 @@ import numpy as np
 from ir_planner.cycle import Curve, LinearProgram, ModeWait, WaitMode
 from ir_values.arrays import FloatArray
 
+Stopped = Callable[[], bool]
+"""Whether a search has to end."""
+
+NEVER: Stopped = lambda: False  # noqa: E731 - a default argument
 _NO_WAIT = 1e-6  # s
 _SERIAL = 2.0  # times the seconds of one robot after the other: no shortest cycle is longer
 
@@ -95,21 +99,30 @@ class JointCycle:
     later: tuple[bool, ...]
 
 
-def shortest_joint(works: Sequence[ArmWork], zones: Sequence[ExclusiveZone]) -> JointCycle | None:
-    """The shortest cycle; None where the zones leave none."""
+def shortest_joint(
+    works: Sequence[ArmWork], zones: Sequence[ExclusiveZone], stopped: Stopped = NEVER
+) -> JointCycle | None:
+    """The shortest cycle; None where the zones leave none, or none was found before it was
+    `stopped`.
+    """
     alone = max(work.shortest for work in works)
     together = sum(work.shortest for work in works)
     lags = sum(lag.seconds for work in works for lag in work.lags)
     model = _Model(works, zones, (alone, _SERIAL * together + lags))
-    return model.solve({model.period: 1.0})
+    return model.solve({model.period: 1.0}, stopped)
 
 
 def cheapest_joint(
-    works: Sequence[ArmWork], zones: Sequence[ExclusiveZone], period: float
+    works: Sequence[ArmWork],
+    zones: Sequence[ExclusiveZone],
+    period: float,
+    stopped: Stopped = NEVER,
 ) -> JointCycle | None:
-    """The cycle of least energy within a period [s]; None where there is none."""
+    """The cycle of least energy within a period [s]; None where there is none, or none was found
+    before it was `stopped`.
+    """
     model = _Model(works, zones, (period, period))
-    return model.solve(model.costs)
+    return model.solve(model.costs, stopped)
 
 
 class _Model:
@@ -213,11 +226,11 @@ class _Model:
             program.row(terms, high=-seconds)
         return later
 
-    def solve(self, costs: Mapping[int, float]) -> JointCycle | None:
+    def solve(self, costs: Mapping[int, float], stopped: Stopped) -> JointCycle | None:
         """The schedule of least costs."""
         for variable, cost in costs.items():
             self._program.cost[variable] = cost
-        answer = self._program.solve()
+        answer = self._program.solve(stopped=stopped)
         if answer.values is None:
             return None
         values = answer.values

@@ -15,16 +15,18 @@ from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.cycle import WaitMode
 from ir_planner.errors import RequestError
-from ir_planner.planner import Planner
+from ir_planner.planner import CLOCK, Planner
 from ir_planner.presentation import plot_robots
 from ir_planner.program import MOTORS, ProgramPlan, StageError, program_of
-from ir_planner.request import Journal, bounded
+from ir_planner.request import Clock, Journal, Work, bounded
 from ir_planner.robots.arm_program import ArmProgram, check_processes, check_repeatable, planned_arm
 from ir_planner.robots.joint_cycle import (
+    NEVER,
     ArmSchedule,
     ArmWork,
     ExclusiveZone,
     JointCycle,
+    Stopped,
     ZoneStretch,
     cheapest_joint,
     shortest_joint,
@@ -141,14 +143,16 @@ def plan_robots(
     peak_power: float = 0.0,
     options: PlanOptions | None = None,
     settings: PlannerSettings | None = None,
+    cancelled: Stopped = NEVER,
+    clock: Clock = CLOCK,
 ) -> RobotsPlan:
     """The cheapest joint cycle of the programs of all robots of a cell that takes `cycle_time` s,
     0: as short as possible. peak_power [W]: no shift of the robots needs more, 0: no limit. Raises
-    RequestError for what makes no sense.
+    RequestError for what makes no sense, CancelledError when `cancelled`. clock: as in Planner.
     """
     bounded(cycle_time, 0.0, PERIOD_MAX, "cycle_time", "s")
     bounded(peak_power, 0.0, WATTS_MAX, "peak_power", "W")
-    planners = tuple(Planner(cell, settings=settings) for cell in cells.cells)
+    planners = tuple(Planner(cell, settings=settings, clock=clock) for cell in cells.cells)
     for robot in cells.robots:
         check_repeatable(robot, cells.of_robot(robot))
     check_processes(cells.by_name)
@@ -156,11 +160,11 @@ def plan_robots(
     arms: list[ArmProgram] = []
     try:
         for robot, planner in zip(cells.robots, planners, strict=True):
-            request, work = planner.cycle_request(options)
+            request, work = planner.cycle_request(options, cancelled)
             arms.append(planned_arm(robot, request, Journal(work, request.options.seed)))
         check_lying_parts(arms)
         arms = _within(arms, peak_power)
-        return _Joint(cells.name, tuple(arms), planners).plan(cycle_time)
+        return _Joint(cells.name, tuple(arms), planners, work).plan(cycle_time)
     except StageError as failed:
         return RobotsPlan(failed.status, cells.name, cells.robots)
 
@@ -178,7 +182,8 @@ def _within(arms: list[ArmProgram], watts: float) -> list[ArmProgram]:
 class _Joint:
     """The joint cycle of programs that are known."""
 
-    def __init__(self, name: str, arms: Arms, planners: tuple[Planner, ...]) -> None:
+    def __init__(self, name: str, arms: Arms, planners: tuple[Planner, ...], work: Work) -> None:
+        self._work = work
         self.name = name
         self.arms = arms
         self.planners = planners
@@ -199,6 +204,7 @@ class _Joint:
         """
         new = False
         for pair in self._pairs:
+            self._work.check()
             arms = self._both(pair)
             between = [zone for zone in zones if (zone.one.robot, zone.other.robot) == pair]
             found = self._meetings.cells(arms, [chosen[k] for k in pair])
@@ -250,12 +256,14 @@ class _Joint:
         works = [arm.work() for arm in self.arms]
         for _ in range(_ROUNDS):
             zones = self._zones()
-            fastest = shortest_joint(works, zones)
+            fastest = shortest_joint(works, zones, self._work.cancelled)
+            self._work.check()
             if fastest is None:
                 break
             period = cycle_time or fastest.period * _SLACK
             self._check_period(period, fastest.period)
-            first = cheapest_joint(works, zones, period)
+            first = cheapest_joint(works, zones, period, self._work.cancelled)
+            self._work.check()
             if first is None:
                 break
             chosen = [
