@@ -57,7 +57,7 @@ PLANNER = Rights(
         *(names.PLAN_TRAJECTORY, names.PLAN_PROGRAM, names.OPTIMIZE_TRAJECTORY),
         *(names.EVALUATE_TRAJECTORY, names.GET_TRAJECTORY, names.GET_PROGRAM, names.PLAN_STANDBY),
         *(names.EXPORT_PROGRAM, names.PLAN_CARTESIAN_MOVEMENT, names.PLAN_ESCAPE),
-        names.PLAN_STEADY_CYCLE,
+        *(names.PLAN_STEADY_CYCLE, names.PLAN_ROBOTS),
     ),
     execute=(names.PLAN,),
 )
