@@ -9,7 +9,7 @@ from ir_msgs_py.status import StatusCode
 from ir_planner.cartesian.chains import ConfigurationChain, Layers, difference
 from ir_planner.cartesian.dead_ends import chains_through, closer_at
 from ir_planner.cartesian.joint_curve import Angle, JointCurve, angle_along, curve_of
-from ir_planner.cartesian.path_times import SentPath, sent, timed_stroke
+from ir_planner.cartesian.path_times import SentPath, TimedStroke, sent, timed_stroke
 from ir_planner.cartesian.slowing import slower_between, unhurried
 from ir_planner.cartesian.speed_ramps import StrokeSpan
 from ir_planner.cartesian.tool_path import PathRefusedError, ToolPath, ToolPathRequest
@@ -18,6 +18,7 @@ from ir_planner.curves import extremes
 from ir_planner.request import DURATION_MAX
 from ir_planner.scene import MotionLimits, PlanningScene, lasting_longer
 from ir_planner.timing import Movement, within_torque
+from ir_values.arrays import FloatArray
 
 T1_SPEED = 0.25  # m/s at the tcp and at the centre of the flange
 COMPARED = 3  # movements, over the cheapest chains by the estimate
@@ -303,7 +304,7 @@ def _as_slow_as_sent(path: SentPath, limits: MotionLimits, scene: PlanningScene)
             break
         counts = np.cumsum([0, *(len(tau) - 1 for tau in path.instants)])
         strokes = tuple(
-            slower_between(stroke, tau, use[first:last], limits, scene)
+            _slower(stroke, tau, use[first:last], limits, scene)
             if use[first:last].max() > 1.0
             else stroke
             for stroke, tau, first, last in zip(
@@ -312,6 +313,24 @@ def _as_slow_as_sent(path: SentPath, limits: MotionLimits, scene: PlanningScene)
         )
         path = sent(strokes, limits, scene)
     return path
+
+
+def _slower(
+    stroke: TimedStroke,
+    points: FloatArray,
+    use: FloatArray,
+    limits: MotionLimits,
+    scene: PlanningScene,
+) -> TimedStroke:
+    """The stroke with more time between points at instants (P,) s of its law where it uses more
+    than the limits (P - 1,), or with more time all along, whichever is shorter.
+    """
+    there = slower_between(stroke, points, use, limits, scene)
+    evenly = stroke.stretched(_EVENLY * float(use.max()))
+    return min(there, evenly, key=lambda one: one.duration)
+
+
+_EVENLY = 1.0 + 1e-6  # of what is exceeded
 
 
 def _check_duration(duration: float, asked: ToolPathRequest) -> None:
