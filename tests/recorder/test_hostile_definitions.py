@@ -7,10 +7,12 @@ from __future__ import annotations
 import struct
 from collections import Counter
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from mcap.writer import Writer
 
 from ir_recorder.errors import ReadError
 from ir_recorder.format import schemas
@@ -19,6 +21,7 @@ from ir_recorder.reading import cdr
 from ir_recorder.reading.cdr import Columns, fitting
 from ir_recorder.reading.mcap_file import RawChannel
 from ir_recorder.reading.messages import decoder_of
+from ir_recorder.reading.reader import read_recording
 
 CASES = 150
 KIND = "p/msg/T0"
@@ -187,3 +190,25 @@ def test_a_long_message_of_too_many_values_is_not_decoded(
     assert len(decode(few).a) == 1_000
     with pytest.raises(ReadError, match="too many values"):
         decode(many)
+
+
+def test_a_topic_of_too_many_values_is_given_up_at_the_first_of_its_messages(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(cdr, "MOST_WALKED", 100_000)
+    counts: Counter[str] = Counter()
+    counted(monkeypatch, cdr._Walker, "structure", counts)("structure", 20_000)
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start("ros2", "stranger")
+        kind = "diagnostic_msgs/msg/DiagnosticArray"
+        text = definition(["p/T1[] a", "bool b"])
+        schema = writer.register_schema(kind, "ros2msg", text.encode())
+        channel = writer.register_channel("/diagnostics", "cdr", schema)
+        for k in range(100):
+            writer.add_message(channel, k, HEADER + struct.pack("<I", 70_000) + bytes(70_000), k)
+        writer.finish()
+    said = [each for each in read_recording(path).problems if "too many values" in each]
+    assert said
+    assert all(each.startswith("/diagnostics: the rest is left out") for each in said)

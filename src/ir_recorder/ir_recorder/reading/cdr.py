@@ -55,8 +55,12 @@ class _Layout:
     end: int  # of the last field
 
 
+class TooManyValuesError(ReadError):
+    """Messages of more values or layouts than are read of a topic."""
+
+
 class _Budget:
-    """What may be done for the messages of a topic; ReadError with the sentence beyond that."""
+    """What may be done for the messages of a topic; beyond that the sentence is an error."""
 
     def __init__(self, most: int, sentence: str) -> None:
         self._left = most
@@ -66,7 +70,7 @@ class _Budget:
         """Do so much."""
         self._left -= amount
         if self._left < 0:
-            raise ReadError(self._sentence)
+            raise TooManyValuesError(self._sentence)
 
 
 class _UnfitError(ReadError):

@@ -17,7 +17,14 @@ from ir_msgs_py.plc import PlcInputs, PlcOutputs
 from ir_recorder.errors import ReadError
 from ir_recorder.format import contents
 from ir_recorder.reading.bag_file import read_bag_file
-from ir_recorder.reading.cdr import Columns, by_name, fitting, joint_groups, one_robot
+from ir_recorder.reading.cdr import (
+    Columns,
+    TooManyValuesError,
+    by_name,
+    fitting,
+    joint_groups,
+    one_robot,
+)
 from ir_recorder.reading.chunk_limits import ReadLimits
 from ir_recorder.reading.mcap_file import RawChannel, RawRecording, chosen_namespace, read_raw
 from ir_recorder.reading.messages import contact_sentence, decoder_of, movement_from, savings_from
@@ -478,6 +485,9 @@ class _SeriesReader:
         for time, data in zip(times.tolist(), channel.messages, strict=True):
             try:
                 message = decode(data) if decode else None
+            except TooManyValuesError as error:
+                self._problems.append(f"{channel.topic}: the rest is left out, {error}")
+                break
             except Exception:  # damaged bytes: the decoder raises nearly anything
                 message = None
             if message is None:
