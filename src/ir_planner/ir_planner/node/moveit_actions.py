@@ -130,7 +130,8 @@ class AcceptedGoals:
     def add(self, goal: Any) -> None:
         """A goal is accepted."""
         key = bytes(goal.goal_id.uuid)
-        self._goals[key] = _Accepted(self._came.pop(key, None) or self._executor.accept())
+        stopped = self._came.pop(key, None)
+        self._goals[key] = _Accepted(self._executor.accept() if stopped is None else stopped)
 
     def stopped(self, goal: Any) -> Cancellation:
         """What cancels it."""

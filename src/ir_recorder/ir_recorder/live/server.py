@@ -490,8 +490,8 @@ class Commands:
             return ButtonAnswer(
                 False, f"{name[:60]!r} is no bit of the PLC: known are {', '.join(BITS)}"
             )
-        asked = {"level": value, "stop": ""} if isinstance(value, bool) else value
-        command = LevelCommand(name, asked["level"], int(asked["stop"] or 0))
+        level, seen = (value, "") if isinstance(value, bool) else (value["level"], value["stop"])
+        command = LevelCommand(name, level, int(seen or 0))
         stop = command.presses_the_stop
         try:
             with self._order:
