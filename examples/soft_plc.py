@@ -18,7 +18,7 @@ import time
 
 from pymodbus.client import ModbusTcpClient
 
-from ir_msgs_py.plc import magic_packet
+from ir_msgs_py.wake_on_lan import magic_packet
 from ir_sim_driver.plc.modbus import COILS, HEARTBEAT, INPUT_REGISTERS, PAUSE
 
 MODES = {

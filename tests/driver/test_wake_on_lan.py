@@ -9,8 +9,8 @@ from typing import cast
 
 import pytest
 
-from ir_msgs_py.plc import magic_packet, send_packet, wakes
 from ir_msgs_py.ros.testing import PATIENCE
+from ir_msgs_py.wake_on_lan import magic_packet, send_packet, wakes
 from ir_sim_driver.errors import DriverError
 from ir_sim_driver.plc import WakeOnLan
 from ir_sim_driver.plc.modbus import ModbusTcp

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from ir_msgs_py.plc import mac_bytes, magic_packet, wakes
+from ir_msgs_py.wake_on_lan import mac_bytes, magic_packet, wakes
 from ir_values.errors import InvalidValueError
 
 MAC = "02:00:00:C4:02:10"

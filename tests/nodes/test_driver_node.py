@@ -20,13 +20,13 @@ from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import PlcInputs, PlcOutputs, PowerMode, PowerState
 from ir_msgs.srv import EndPause, QueryModes, Recover, SetLoad, SetPlcInput, StartPause
 from ir_msgs_py import names
-from ir_msgs_py.plc import magic_packet
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.stop_numbers import same_driver
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_msgs_py.wake_on_lan import magic_packet
 from ir_sim_driver.controller.mains import Mains
 from ir_sim_driver.node import SimDriver, topics
 from ir_sim_driver.plant import plant_to_yaml, typical_plant

@@ -24,7 +24,6 @@ from ir_msgs.srv import GetProgram, GetTrajectory, QueryModes, SetLoad, SetPlcIn
 from ir_msgs_py import status
 from ir_msgs_py.modes import Mode, TransitionTimes
 from ir_msgs_py.names import JOINT_NAMES
-from ir_msgs_py.plc import magic_packet
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros import client
 from ir_msgs_py.ros.client import Client
@@ -37,6 +36,7 @@ from ir_msgs_py.ros.topics import LATCHED
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_msgs_py.wake_on_lan import magic_packet
 from ir_program_runner.machines import Machines
 from ir_program_runner.node import ProgramRunnerNode
 

@@ -17,7 +17,6 @@ from ir_msgs.msg import PowerState
 from ir_msgs.srv import Recover, SetPlcInput
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.names import JOINT_NAMES
-from ir_msgs_py.plc import send_packet
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.plan_conversions import planned_movement_to_msg
@@ -25,6 +24,7 @@ from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_msgs_py.wake_on_lan import send_packet
 from ir_program_runner.node import ProgramRunnerNode
 from ir_sim_driver.node import SimDriver
 from ir_values.errors import RequestRefusedError

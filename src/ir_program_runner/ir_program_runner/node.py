@@ -22,7 +22,7 @@ from ir_msgs.msg import Signal as SignalMsg
 from ir_msgs_py import names
 from ir_msgs_py.announcements import Event, ProgramState
 from ir_msgs_py.modes import PREFIX, Mode, TransitionTimes
-from ir_msgs_py.plc import Signal, magic_packet, send_packet
+from ir_msgs_py.plc import Signal
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros.conversions import status_to_msg, time_from_msg
 from ir_msgs_py.ros.diagnostics import OK, WARN, Condition, Diagnostics
@@ -35,6 +35,7 @@ from ir_msgs_py.ros.serving import RecordedActionServer
 from ir_msgs_py.ros.topics import ACTION_SERVICES, BURST, COMMANDS, CommandTopic
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
+from ir_msgs_py.wake_on_lan import magic_packet, send_packet
 from ir_program_runner.errors import ProgramError
 from ir_program_runner.fulfilment import Fulfilment, Ports
 from ir_program_runner.machines import MOST_SIGNALS, Machines, MachineTime

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ir_msgs_py.plc import CONTROLLER_MAC, WAKE_PORT, mac_bytes
+from ir_msgs_py.wake_on_lan import CONTROLLER_MAC, WAKE_PORT, mac_bytes
 from ir_values.settings import check_settings, setting
 
 _HOUR = 3600.0

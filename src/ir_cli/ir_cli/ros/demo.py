@@ -28,10 +28,10 @@ from ir_description import Cell, cell_to_yaml, load_cell
 from ir_msgs.srv import StartRecording, StopRecording
 from ir_msgs_py import names
 from ir_msgs_py.options import PlanOptions
-from ir_msgs_py.plc import magic_packet, send_packet
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.ros.client import Client, ProgramAnswer
 from ir_msgs_py.savings import one_sided
+from ir_msgs_py.wake_on_lan import magic_packet, send_packet
 from ir_planner import Goal, Planner
 from ir_program_runner.settings import LinkSettings
 from ir_recorder import (

@@ -39,9 +39,9 @@ from ir_values.errors import InvalidValueError, JointNamesError, PoseError
 # What requests say, as values: states, goals, poses, options, trajectories. Nothing here is
 # planned.
 
-# rad/s: a measured state that is slower stands; ends of planned movements are at rest
+# A measured state that is slower stands [rad/s]; ends of planned movements are at rest.
 AT_REST = 0.01
-# s; 4 s for a driver that publishes 500 times a second
+# Looks for a state, each so long [s]: 4 s for a driver that publishes 500 times a second.
 LOOK = 0.02
 LOOKS = 200
 _SHOWN = 6  # names of foreign joints in a sentence

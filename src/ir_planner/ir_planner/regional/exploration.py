@@ -31,16 +31,16 @@ from ir_values.arrays import FloatArray
 Searches = Mapping[str, Search]
 Path = tuple[str, FloatArray]  # the search that found it, and its waypoints (M, n)
 GUESS = "guess"  # the method of movements that a guess became
-# that guesses lead to, and so many to each of them
-_GOALS = 6
-_FEWEST_GUESSES = 8
+_GOALS = 6  # configurations of a pose that guesses lead to
+_FEWEST_GUESSES = 8  # to each of them
 # Where a straight segment is free, another class is rarely cheaper: fewer guesses, and only those
 # descend further that cost less than so many times the straight one at first sight.
 _FEW_GUESSES = 8
 _WORTH_FOLLOWING = 1.3
-# refined like the best where a duration is requested: their order in joules is less certain
+# Paths beside the best that are refined like it where a duration is requested: their order in
+# joules is less certain.
 _RIVALS = 2
-# coarse solutions that are optimised per turn: the second is best in one of four tasks
+# Coarse solutions that are optimised per turn: the second is best in one of four tasks.
 _REFINED = 2
 
 

@@ -40,9 +40,9 @@ from ir_planner.timing import (
 from ir_values.arrays import FloatArray
 
 Answer = tuple[str, Movement]  # the search that found it
-# coarse solutions refined for another objective, and the best of them thoroughly
+# Coarse solutions that are refined for another objective; the best of them thoroughly.
 _OPTIMISED_AGAIN = 2
-# factors tried on that of least joules, in so many steps
+# Factors on the duration of least joules that are tried, in so many steps.
 _OTHER_DURATIONS = (0.75, 1.33)
 _DURATION_STEPS = 4
 _COARSELY = 0.99  # of a bound by a few durations: the best of all is little below it

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ir_msgs_py.plc import CONTROLLER_MAC, WAKE_PORT, mac_bytes, wakes
+from ir_msgs_py.wake_on_lan import CONTROLLER_MAC, WAKE_PORT, mac_bytes, wakes
 from ir_sim_driver.errors import DriverError
 from ir_sim_driver.plc.port import Controller, OpenLink
 from ir_values.settings import check_settings, setting
