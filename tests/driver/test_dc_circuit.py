@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_kernels.power import REGENERATIONS, DcBusParameters, Regeneration, dc_bus
+from ir_sim_driver.plant.dc_link import PRECHARGE, DcCircuit
 from ir_sim_driver.plant.plant_parameters import LinkFigures
-from ir_sim_driver.plant.power_meter import PRECHARGE, DcCircuit
 
 DT = 0.001
 IDEAL_CHOPPER = LinkFigures(1.33e-3, 560.0, 688.0, 688.0, 11.0, 0.0, 0.0)
