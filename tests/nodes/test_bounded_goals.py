@@ -15,8 +15,7 @@ from trajectory_msgs.msg import JointTrajectoryPoint, MultiDOFJointTrajectoryPoi
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import JointTolerance
 from ir_msgs_py.ros.topics import ACTION_SERVICES
-from ir_sim_driver.node import SimDriver, node
-from ir_sim_driver.node import trajectory_actions as bounded_goals
+from ir_sim_driver.node import SimDriver, bounded_goals, node
 
 MOST = 10
 

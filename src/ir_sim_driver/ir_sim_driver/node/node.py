@@ -33,6 +33,7 @@ from ir_msgs_py.stop_numbers import before_first_stop
 from ir_sim_driver.controller import Driver, Joints, Simulation, ended_by_stop, make_simulation
 from ir_sim_driver.errors import DriverError, TrajectoryRefusedError
 from ir_sim_driver.node.announcements import DriverAnnouncements
+from ir_sim_driver.node.bounded_goals import Admission, BoundedActionServer
 from ir_sim_driver.node.controller_interface import (
     StateQueries,
     control_type,
@@ -51,7 +52,7 @@ from ir_sim_driver.node.presses import (
 from ir_sim_driver.node.real_time import FOREIGN, OWN, SYSTEM, GridThread, ScaledClock
 from ir_sim_driver.node.services import DriverServices
 from ir_sim_driver.node.topics import StopTopics, Streams, TrajectoryTopic
-from ir_sim_driver.node.trajectory_actions import Admission, BoundedActionServer, Executions
+from ir_sim_driver.node.trajectory_actions import Executions
 from ir_sim_driver.node.visualization import RobotMarkers, open_transforms
 from ir_sim_driver.notices import Level, Notice, shortened
 from ir_sim_driver.plc import Link, OpenLink, WakeOnLan

@@ -29,6 +29,7 @@ from ir_msgs_py.ros.rclpy_inside import can_take_messages, take_bytes
 from ir_msgs_py.ros.topics import LATCHED
 from ir_sim_driver.controller import Driver, Frame, Joints, refused
 from ir_sim_driver.motion import ErrorCode, GoalOutcome, TrajectoryGoal
+from ir_sim_driver.node.bounded_goals import Admit, TrajectoryReader
 from ir_sim_driver.node.controller_interface import ControllerStates
 from ir_sim_driver.node.messages import (
     fill_controller_state,
@@ -36,7 +37,6 @@ from ir_sim_driver.node.messages import (
     fill_load_check,
     goal_from_trajectory,
 )
-from ir_sim_driver.node.trajectory_actions import Admit, TrajectoryReader
 
 # Trajectories by topic: taken as bytes, so that a huge one is refused before Python objects are
 # made of it, and parsed beside the control loop.
