@@ -39,7 +39,8 @@ from ir_recorder import Analysis, analyse, findings, read_recording
 from ir_recorder.analysis.tending import MachineTimes, PartRow, Span, TendedStep, Tending
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.format.schemas import SchemaLibrary
-from ir_recorder.recording.session import CellFiles, RecordingSession
+from ir_recorder.recording.cell_files import CellFiles
+from ir_recorder.recording.session import RecordingSession
 from ir_recorder.recording.writer import RecordingWriter
 from ir_recorder.report import report_html
 

@@ -11,7 +11,7 @@ import pytest
 from ir_recorder import Analysis, analyse
 from ir_recorder.analysis.production import idle_watts
 from ir_recorder.format import contents
-from ir_recorder.recording.session import data_of_cell, files_of_cell
+from ir_recorder.recording.cell_files import data_of_cell, files_of_cell
 
 
 def test_all_eight_values_of_table_2_come_out_of_the_recording_alone(analysis: Analysis) -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from ir_recorder.reading.mcap_file import read_raw
-from ir_recorder.recording.session import CellFiles, RecordingSession
+from ir_recorder.recording.cell_files import CellFiles
+from ir_recorder.recording.session import RecordingSession
 from ir_recorder.recording.writer import RecordingWriter
 
 

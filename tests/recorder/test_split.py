@@ -14,7 +14,8 @@ from ir_recorder.errors import RecorderError
 from ir_recorder.format.contents import Split, is_further_part, part_path
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.reading.mcap_file import RawRecording, read_raw
-from ir_recorder.recording.session import CellFiles, RecordingSession, check_free
+from ir_recorder.recording.cell_files import CellFiles
+from ir_recorder.recording.session import RecordingSession, check_free
 from ir_recorder.recording.writer import RecordingSummary, RecordingWriter
 
 TOPICS = {

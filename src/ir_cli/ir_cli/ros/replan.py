@@ -40,7 +40,8 @@ from ir_recorder.format import contents
 from ir_recorder.reading.mcap_file import RawRecording, chosen_namespace, read_raw
 from ir_recorder.reading.planner_answers import completed
 from ir_recorder.recording.arithmetic import arithmetic
-from ir_recorder.recording.session import PACKAGES, data_of_cell, installed_version
+from ir_recorder.recording.cell_files import data_of_cell
+from ir_recorder.recording.session import PACKAGES, installed_version
 from ir_values.errors import InvalidValueError, IrError
 from ir_values.settings import changed, tree
 

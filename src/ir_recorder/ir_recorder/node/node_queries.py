@@ -18,7 +18,7 @@ from ir_msgs.srv import GetCell
 from ir_msgs_py import names
 from ir_msgs_py.status import StatusCode
 from ir_recorder.format.contents import PARAMETERS, POWER_PARAMETERS
-from ir_recorder.recording.session import CellFiles
+from ir_recorder.recording.cell_files import CellFiles
 
 PATIENCE = 5
 """Looks, each a second after the other, at a request that nobody has answered."""

@@ -5,32 +5,22 @@ from __future__ import annotations
 import struct
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from glob import escape
 from importlib.metadata import PackageNotFoundError, version
-from importlib.resources import files
 from pathlib import Path
 
 from mcap.exceptions import McapError
 from mcap.records import Chunk, Message, Metadata
 from mcap.stream_reader import StreamReader
 
-from ir_description import (
-    DescriptionError,
-    cell_from_yaml,
-    cell_to_yaml,
-    load_cell,
-    load_robot_cells,
-    robot_urdf,
-)
-from ir_description.library import robot_in
 from ir_recorder.errors import LostFileError, RecorderError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import Split, part_facts, part_path
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.recording.arithmetic import arithmetic
+from ir_recorder.recording.cell_files import CellFiles, data_of_cell
 from ir_recorder.recording.writer import RecordingSummary, RecordingWriter, checked_path
-from ir_values.errors import FileRefusedError, InvalidValueError
+from ir_values.errors import FileRefusedError
 from ir_values.extensions import installed_extensions
 from ir_values.files import ANYWHERE
 
@@ -109,26 +99,6 @@ class LatchedMessages:
         return {topic: len(kept) for topic, kept in self._kept.items() if kept}
 
 
-# Data that a cell refers to by name, as a recording carries them: the robot's and its controller's
-# files.
-
-
-def data_of_cell(cell_yaml: str) -> dict[str, str]:
-    """Texts by attachment; empty for a text that is no cell."""
-    try:
-        robot = cell_from_yaml(cell_yaml, "the attached cell").robot
-    except (DescriptionError, InvalidValueError):
-        return {}
-    data = files("ir_description") / "data"
-    if robot.document:  # the cell's text has it, its controller included
-        return {contents.ROBOT: robot.document}
-    found = {contents.ROBOT: data / "robots" / f"{robot.name}.yaml"}
-    found[contents.POWER] = data / "power" / f"{robot.controller.name}.yaml"
-    return {
-        name: path.read_text(encoding="utf-8") for name, path in found.items() if path.is_file()
-    }
-
-
 # One recording in progress: channels by topic, what is attached, and what became of it. No ROS
 # here.
 
@@ -144,17 +114,6 @@ PACKAGES = (
     ),
     *("ir_msgs", "numpy", "scipy", "pybullet", "rclpy"),
 )
-
-
-@dataclass(frozen=True)
-class CellFiles:
-    """The cell in its own file format, and the robot's URDF; namespace: of one of several robots,
-    whose attachments are in a folder of its name.
-    """
-
-    cell_yaml: str
-    urdf: str
-    namespace: str = ""
 
 
 class RecordingSession:
@@ -292,25 +251,3 @@ def installed_version(package: str) -> str:
         return version(package)
     except PackageNotFoundError:
         return "unknown"
-
-
-# The cell as a recording carries it, so that the file can be read on its own.
-
-
-def files_of_cell(name_or_path: str) -> tuple[CellFiles, ...]:
-    """Files of a bundled cell or of one on disk, of each robot where it has several.
-
-    Raises RecorderError when there is none or it is broken.
-    """
-    try:
-        named = robot_in(name_or_path)[1]
-        several = None if named else load_robot_cells(name_or_path)
-        cells = {"": load_cell(name_or_path)} if several is None else several.by_name
-    except DescriptionError as error:
-        raise RecorderError(f"cell {name_or_path[:200]!r} can't be attached: {error}") from error
-    return tuple(
-        CellFiles(
-            cell_to_yaml(cell), robot_urdf(cell.robot, cell.tool, cell.tcp, cell.base_pose), robot
-        )
-        for robot, cell in cells.items()
-    )
