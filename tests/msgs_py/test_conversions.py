@@ -244,8 +244,6 @@ program_savings = st.builds(
     st.integers(0, 500),
     texts,
     texts,
-    numbers,
-    numbers,
 )
 
 ROUND_TRIPS = {

@@ -447,7 +447,7 @@ def tending_parts(analysis: Analysis) -> Analysis:
         )
         for k, result in enumerate(analysis.steps)
     )
-    machines = (MachineTimes("lathe", 0, (halves[0],), (halves[1],)),)
+    machines = (MachineTimes("lathe", (halves[0],), (halves[1],)),)
     return replace(analysis, tending=Tending(parts, 1, machines, steps))
 
 

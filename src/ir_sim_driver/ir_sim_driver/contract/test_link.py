@@ -37,7 +37,7 @@ class Recorder:
     def inputs(self) -> PlcInputs:
         return self.levels
 
-    def write_inputs(self, writer: str, levels: Mapping[str, bool]) -> None:
+    def write_inputs(self, writer: str, levels: Mapping[str, bool], came_ns: int = 0) -> None:
         self.calls.append(f"{writer} writes {dict(levels)}")
 
     def write_mode_and_pause(
