@@ -15,7 +15,8 @@ from ir_recorder.format.contents import Split, is_further_part, part_path
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.reading.mcap_file import RawRecording, read_raw
 from ir_recorder.recording.cell_files import CellFiles
-from ir_recorder.recording.session import RecordingSession, check_free
+from ir_recorder.recording.session import RecordingSession
+from ir_recorder.recording.split_files import check_free
 from ir_recorder.recording.writer import RecordingSummary, RecordingWriter
 
 TOPICS = {

@@ -36,8 +36,9 @@ from ir_recorder.node.node_queries import CellRequest, ParameterRequests
 from ir_recorder.node.subscriptions import TopicListener, is_own
 from ir_recorder.recording.cell_files import CellFiles, files_of_cell
 from ir_recorder.recording.cell_topics import TopicSelection, checked_topics, single_type
-from ir_recorder.recording.session import RecordingSession, check_free, continued_path
+from ir_recorder.recording.session import RecordingSession
 from ir_recorder.recording.settings import RecorderSettings
+from ir_recorder.recording.split_files import check_free, continued_path
 from ir_recorder.recording.worker import Act, Message, RecordingWorker
 from ir_recorder.recording.writer import OpenWriter, RecordingSummary, RecordingWriter, open_writer
 from ir_values.errors import InvalidValueError, IrError, one_line
