@@ -256,7 +256,7 @@ def test_a_saving_pays_for_hours_of_an_engineer(saved: float, words: str) -> Non
     costs = Costs(engineer_hour=60.0)
     year = Amount(1.0, 0.5, 1.5).times(saved)
     assert payback(year, costs) == (
-        f"pays back in a year what takes less than {words} h of an engineer (60 EUR/h)"
+        f"worth it within a year where it takes less than {words} h of an engineer (60 EUR/h)"
     )
     assert payback(replace(year, low=-year.low), costs) == ""
 

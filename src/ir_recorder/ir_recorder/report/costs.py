@@ -491,7 +491,7 @@ def payback(money: Amount, costs: Costs) -> str:
         return ""
     hours = significant(money.value / costs.engineer_hour, 2)
     hour = f"{costs.engineer_hour:g} {costs.currency}/h"
-    return f"pays back in a year what takes less than {hours} h of an engineer ({hour})"
+    return f"worth it within a year where it takes less than {hours} h of an engineer ({hour})"
 
 
 def share_between(amount: Amount, of: float) -> str:
