@@ -424,14 +424,17 @@ class ModbusServer:
             pass
         finally:
             self._heard.pop(writer, None)
-            self._leaving.pop(writer, None)
+            leaves = self._leaving.pop(writer, None)
+            if leaves is not None:
+                leaves.cancel()
             writer.close()
 
     def _take_leave(self, writer: asyncio.StreamWriter) -> None:
         """Give a client that has no place a second to say one thing."""
         if len(self._leaving) >= _LEAVING:
-            next(iter(self._leaving)).transport.abort()
-            del self._leaving[next(iter(self._leaving))]
+            eldest = next(iter(self._leaving))
+            self._leaving.pop(eldest).cancel()
+            eldest.transport.abort()
         self._leaving[writer] = self._loop.call_later(_HELD, writer.transport.abort)
 
     async def _within(self, work: Awaitable[T]) -> T:
