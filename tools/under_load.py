@@ -7,9 +7,7 @@ many tests passed, failed and were repeated, the seconds, and the machine's load
 of the run; the names of failed tests follow it. The output of each run is in out/under_load. The
 exit code is 1 where any run failed.
 
-Runs at once are each other's load, and leave the processor to tests instead of busy processes. A
-demonstration gives up where its plant lags for longer than the brakes' timer: four runs at once
-beside four busy processes are too much for two cores.
+Runs at once are each other's load, and leave the processor to tests instead of busy processes.
 
 The busy processes are ended by their ids; they also end by themselves when this process dies.
 """
