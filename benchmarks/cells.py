@@ -1,13 +1,19 @@
 """Is the cheapest cycle of a robotic cell found and proved, and how soon?
 
-    python benchmarks/cells.py [--only drawn|steady|flexible|driven|robots] [--file FILE.xml]...
+    python benchmarks/cells.py [--only drawn|large|files|steady|flexible|driven|robots]
+                               [--file FILE.xml]... [--energies TABLE.md] [--published S]
                                [--seeds N] [--seconds S] [--part K/N] [--quick] [--json FILE]
 
-Cells drawn at random that have a schedule by construction, and instances of the public benchmark
-where --file names them. Each is solved by the project's model and by the published one, in the same
-solver and invocation, each with as many seconds of processor time; a judge that knows only the file
-checks every schedule and its energy. The laws: every schedule is valid, costs what it says, and is
-proved; the published model, with its ten segments per curve, never proves a bound above it.
+drawn: cells drawn at random that have a schedule by construction. files: instances of the public
+benchmark that --file names. Each is solved by the project's model and by the published one, in the
+same solver and invocation, each with as many seconds of processor time (--published: other seconds
+for the published one, 0 leaves it out); a judge that knows only the file checks every schedule and
+its energy. The laws: every schedule is valid, costs what it says, and is proved; the published
+model, with its ten segments per curve, never proves a bound above it. --energies: a table in
+Markdown with columns "instance" and "least energy J", above which no schedule may be.
+
+large: drawn cells of 5, 8 and 12 robots by the project's model alone, 5 robots for two minutes,
+more for ten: seconds to the first schedule, and the gap at the end.
 
 steady: drawn cells of one robot that tends up to six machines, cycles of one and of two parts, a
 minute of processor time for each; up to four machines beside brute force over all orders and modes.
@@ -26,7 +32,6 @@ machines by the program runner's own steps: every part needs what was planned wi
 
 from __future__ import annotations
 
-import argparse
 import time
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterable, Iterator
@@ -50,9 +55,12 @@ from ir_recorder.analysis.tending import tending_of
 from ir_studies.cells import CellAnswer, read_instances, solve_cell, written
 from ir_studies.stepped_run import driven_program
 
-PARTS = ("drawn", "steady", "flexible", "driven", "robots")
+PARTS = ("drawn", "large", "files", "steady", "flexible", "driven", "robots")
 SIZES = ((2, 6), (3, 6), (3, 9))  # robots and stops of each
-LARGE = ((5, 10), (8, 10))
+LARGE = ((5, 10, 120.0, 1.0), (8, 10, 600.0, 5.0), (12, 10, 600.0, 5.0))
+"""Robots, stops of each, seconds of processor time, and the gap [%] within them."""
+FIRST_SECONDS = 60.0  # of processor time, to a first schedule of a large cell
+ENERGY = 1e-5  # relative: what a schedule may be above a listed energy
 PARTS_PER_HOUR = 30.0
 CYCLES = 4
 MACHINES = 6
@@ -63,8 +71,8 @@ BRUTE = 4  # machines of which all orders are tried
 
 @dataclass(frozen=True)
 class Row:
-    """An instance: energy [J], gap [%], faults by the judge, processor seconds, the published
-    model's.
+    """An instance: energy [J], gap [%], faults by the judge, processor seconds and those to the
+    first schedule, the published model's.
     """
 
     name: str
@@ -73,6 +81,7 @@ class Row:
     gap: float
     faults: int
     seconds: float
+    first_seconds: float
     published: float
     published_seconds: float
 
@@ -157,7 +166,11 @@ def main() -> None:
     parser = command_line(__doc__, ["drawn"], 5, "two seeds, no large cells")
     parser.add_argument("--only", choices=PARTS, help="one part of it")
     parser.add_argument("--file", action="append", default=[], help="instances of the benchmark")
+    parser.add_argument("--energies", type=Path, help="table of the least energies of instances")
     parser.add_argument("--seconds", type=float, default=120.0, help="of processor time")
+    parser.add_argument(
+        "--published", type=float, help="seconds of the published model, default: --seconds"
+    )
     parser.add_argument("--part", default="1/1", metavar="K/N", help="of the cells of robots")
     arguments = parser.parse_args()
     seeds = 2 if arguments.quick else arguments.seeds
@@ -182,10 +195,21 @@ def main() -> None:
         parts = driven_rows()
         claims += driven_claims(parts)
         rows += parts
+    asked = seconds if arguments.published is None else arguments.published
     if arguments.only in (None, "drawn"):
-        solved = drawn_rows(arguments, seeds, seconds)
-        claims += drawn_claims(solved)
+        solved = list(instance_rows(drawn_files(seeds), seconds, asked))
+        claims += small_claims("drawn", solved)
         rows += solved
+    if arguments.only in (None, "files") and arguments.file:
+        solved = list(instance_rows(map(Path, arguments.file), seconds, asked))
+        listed = energies(arguments.energies) if arguments.energies else {}
+        claims += [*small_claims("files", solved), *energy_claims(solved, listed)]
+        rows += solved
+    if arguments.only == "large" or (arguments.only is None and not arguments.quick):
+        for robots, stops, most, gap in LARGE:
+            solved = list(instance_rows([drawn_file(robots, stops, 2, conflicts=40)], most, 0.0))
+            claims += large_claims(robots, solved, gap)
+            rows += solved
     finish(arguments.json, [asdict(row) for row in rows], claims)
 
 
@@ -395,50 +419,85 @@ def driven_claims(rows: list[DrivenRow]) -> list[Claim]:
     ]
 
 
-def drawn_rows(arguments: argparse.Namespace, seeds: int, seconds: float) -> list[Row]:
-    """Drawn cells and files."""
-    rows = []
-    for text, peer in texts(seeds, arguments.file, large=not arguments.quick):
-        elements = ET.fromstring(text).findall("instance")  # a data set may have a name, too
-        for element, instance in zip(elements, instances(text), strict=True):
-            rows.append(row_of(element, solve_cell(instance, seconds), seconds, peer=peer))
-            print(line_of(asdict(rows[-1])), flush=True)
-    return rows
+def instance_rows(paths: Iterable[Path], seconds: float, published: float) -> Iterator[Row]:
+    """Every instance of some files, each with so many seconds of processor time."""
+    for path in paths:
+        elements = ET.parse(path).getroot().findall("instance")  # a data set may have a name, too
+        for element, instance in zip(elements, read_instances(path), strict=True):
+            row = row_of(element, solve_cell(instance, seconds), published)
+            print(line_of(asdict(row)), flush=True)
+            yield row
 
 
-def drawn_claims(rows: list[Row]) -> list[Claim]:
+def small_claims(name: str, rows: list[Row]) -> list[Claim]:
     """Valid, proved, and sooner than the published model."""
-    small = [row for row in rows if np.isfinite(row.published_seconds)]
-    large = [row for row in rows if not np.isfinite(row.published_seconds)]
-    ratio = np.median([r.seconds for r in small]) / np.median([r.published_seconds for r in small])
+    proved = 100.0 * np.mean([row.gap == 0.0 for row in rows])
     claims = [
-        at_most("schedules with a fault", sum(row.faults > 0 for row in rows), "", 0),
-        at_least("proved, small cells", 100.0 * np.mean([r.gap == 0.0 for r in small]), "%", 100.0),
-        at_most("median processor time over the published model's", ratio, "", 0.2),
+        at_most(f"{name}: schedules with a fault", sum(row.faults > 0 for row in rows), "", 0),
+        at_least(f"{name}: proved", proved, "%", 100.0),
     ]
-    if large:
-        claims.append(at_most("largest gap, large cells", max(r.gap for r in large), "%", 5.0))
+    peers = [row for row in rows if np.isfinite(row.published_seconds)]
+    if peers:
+        seconds = np.median([row.seconds for row in peers])
+        ratio = seconds / np.median([row.published_seconds for row in peers])
+        claims.append(
+            at_most(f"{name}: median processor time over the published model's", ratio, "", 0.2)
+        )
     return claims
 
 
-def texts(seeds: int, files: list[str], *, large: bool) -> Iterator[tuple[str, bool]]:
-    """Datasets as text, and whether the published model is asked too."""
+def energy_claims(rows: list[Row], listed: dict[str, float]) -> list[Claim]:
+    """None above what is listed."""
+    over = [row.energy / listed[row.name] - 1.0 for row in rows if row.name in listed]
+    if not over:
+        return []
+    return [
+        at_least("files: energies listed", len(over), "", 1),
+        at_most("files: energy above the listed one, relative", max(over), "", ENERGY),
+    ]
+
+
+def energies(path: Path) -> dict[str, float]:
+    """Least energies [J] by instance, of a table in Markdown."""
+    rows = [
+        [cell.strip() for cell in line.strip().strip("|").split("|")]
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if line.lstrip().startswith("|")
+    ]
+    name = rows[0].index("instance")
+    joules = rows[0].index("least energy J")
+    return {row[name]: float(row[joules]) for row in rows[2:]}
+
+
+def large_claims(robots: int, rows: list[Row], gap: float) -> list[Claim]:
+    """Valid, a schedule soon, and near the least energy."""
+    name = f"{robots} robots"
+    faults = sum(row.faults > 0 for row in rows)
+    first = max(row.first_seconds for row in rows)
+    return [
+        at_most(f"{name}: schedules with a fault", faults, "", 0),
+        at_most(f"{name}: processor time to a schedule", first, "s", FIRST_SECONDS),
+        at_most(f"{name}: largest gap", max(row.gap for row in rows), "%", gap),
+    ]
+
+
+def drawn_files(seeds: int) -> Iterator[Path]:
+    """Small data sets."""
     for robots, stops in SIZES:
-        yield written([drawn(robots, stops, seed) for seed in range(seeds)]), True
-    for file in files:
-        yield Path(file).read_text(encoding="utf-8"), True
-    for robots, stops in LARGE if large else ():
-        yield written([drawn(robots, stops, seed, conflicts=40) for seed in range(2)]), False
+        yield drawn_file(robots, stops, seeds, conflicts=12)
 
 
-def instances(text: str) -> list:
-    path = Path("out/cells.xml")
+def drawn_file(robots: int, stops: int, seeds: int, *, conflicts: int) -> Path:
+    """Drawn cells, in a file."""
+    path = Path(f"out/drawn_{robots}_{stops}.xml")
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8")
-    return read_instances(path)
+    drawn_cells = [drawn(robots, stops, seed, conflicts) for seed in range(seeds)]
+    path.write_text(written(drawn_cells), encoding="utf-8")
+    return path
 
 
-def row_of(element: ET.Element, answer: CellAnswer, seconds: float, *, peer: bool) -> Row:
+def row_of(element: ET.Element, answer: CellAnswer, seconds: float) -> Row:
+    """Judged; seconds: of the published model, 0: it isn't asked."""
     schedule = [
         (d.activity, d.choice, d.mode, d.start, d.duration)
         for robot in (answer.schedule.robots if answer.schedule else ())
@@ -449,17 +508,18 @@ def row_of(element: ET.Element, answer: CellAnswer, seconds: float, *, peer: boo
         found.append("its energy is another")
     published = np.nan
     published_seconds = np.nan
-    if peer:
+    if seconds > 0.0:
         begin = time.process_time()
         published = PublishedModel(answer.instance).solve(seconds).cost
         published_seconds = time.process_time() - begin
     return Row(
-        element.findtext("name") or answer.instance.name,
+        answer.instance.name,
         len(answer.instance.robots),
         answer.energy,
         100.0 * answer.gap,
         len(found),
         answer.seconds,
+        answer.first_seconds,
         published,
         published_seconds,
     )

@@ -33,13 +33,14 @@ _PART_SHARE = 0.1  # of the seconds, for one part
 @dataclass(frozen=True)
 class CellAnswer:
     """schedule: None where none was found; bound [J]: no schedule needs less, inf: there is none;
-    seconds: of processor time.
+    seconds: of processor time; first_seconds: until there was a schedule (inf: there is none).
     """
 
     instance: Instance
     schedule: Schedule | None
     bound: float
     seconds: float
+    first_seconds: float = np.inf
 
     @property
     def energy(self) -> float:
@@ -106,6 +107,7 @@ class _Search:
         self._bound = 0.0
         self._best: Schedule | None = None
         self._point: FloatArray | None = None
+        self._first = np.inf
 
     @property
     def _left(self) -> float:
@@ -121,7 +123,7 @@ class _Search:
             self._whole()
             rounds += 1
         spent = time.process_time() - self._begun
-        return CellAnswer(self._instance, self._best, self._bound, spent)
+        return CellAnswer(self._instance, self._best, self._bound, spent, self._first)
 
     @property
     def _done(self) -> bool:
@@ -159,6 +161,8 @@ class _Search:
             if not self._model.refine(values, _CLOSE * abs(answer.cost)):
                 break
         schedule = self._model.schedule(values)
+        if self._best is None:
+            self._first = time.process_time() - self._begun
         if self._best is None or schedule.energy < self._best.energy:
             self._best = schedule
             self._point = values
