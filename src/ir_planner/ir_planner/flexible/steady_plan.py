@@ -82,11 +82,12 @@ class CyclePoint:
 
 @dataclass(frozen=True, eq=False)
 class SteadyPlan:
-    """cycle: the schedule, made until every slot of a machine has been used; gap [%]: how far above
-    the cheapest one it can be, for the configurations that were chosen and movements that begin
-    with an empty capacitor. program: its movements and pauses, in `cell`. problem: what the cycle
-    was chosen from. fastest [s]: the shortest period of a part. run: the program that fills the
-    line and makes the cycles that were asked for, in `run_cell`; None for none.
+    """once: the schedule; cycle: the same, made until every slot of a machine has been used;
+    gap [%]: how far above the cheapest one it can be, for the configurations that were chosen and
+    movements that begin with an empty capacitor. program: its movements and pauses, in `cell`.
+    problem: what the cycle was chosen from. fastest [s]: the shortest period of a part. run: the
+    program that fills the line and makes the cycles that were asked for, in `run_cell`; None for
+    none.
     """
 
     status: Status
@@ -97,6 +98,7 @@ class SteadyPlan:
     process: tuple[float, ...] = ()
     problem: SteadyProblem | None = None
     request: ProgramRequest | None = None
+    once: SteadyCycle | None = None
     cycle: SteadyCycle | None = None
     gap: float = 0.0
     fastest: float = 0.0
@@ -262,6 +264,7 @@ def plan_steady_cycle(
                 f"{HOUR / fastest:.2f} are possible, one in {fastest:.2f} s",
             )
         model, chosen = ways.cheapest(max(period, fastest * _SLACK), units)
+        once = chosen.cycle
         chosen = chosen.in_turn()
         notes.append(f"{chosen.cycle.period:.2f} s, {chosen.cycle.joules:.0f} J")
     plan = SteadyPlan(
@@ -272,6 +275,7 @@ def plan_steady_cycle(
         machines=machines_of(model.request.cell),
         process=model.problem.process,
         problem=model.problem,
+        once=once,
         cycle=chosen.cycle,
         gap=chosen.gap,
         fastest=fastest,
