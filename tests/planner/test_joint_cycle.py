@@ -5,10 +5,11 @@ zones and the schedule alone.
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 from ir_planner.cycle import Curve, WaitMode
 from ir_planner.robots.joint_cycle import (
@@ -149,6 +150,109 @@ def test_the_best_order_is_that_of_all_orders() -> None:
     ]
     least = min(each.joules for each in found if each is not None)
     assert cheapest(works, zones, period).joules == pytest.approx(least, rel=1e-6)
+
+
+def least_by_orders(
+    works: list[ArmWork], zones: list[ExclusiveZone], period: float, cycles: range
+) -> float:
+    """Least joules of two robots: every order in every zone, every mode of every wait, and for each
+    a linear program of SciPy's. cycles: by how many the second robot may be late in a zone.
+    """
+    best = np.inf
+    modes = [[None, *each] for work in works for each in work.modes]
+    free = tuple(WaitMode("", 0.0, period, 0.0, 0.0) for _ in modes)
+    for late in product(cycles, repeat=len(zones)):
+        if not np.isfinite(least_of_order(works, zones, period, late, free)):
+            continue
+        for chosen in product(*modes):
+            best = min(best, least_of_order(works, zones, period, late, chosen))
+    return best
+
+
+def least_of_order(
+    works: list[ArmWork],
+    zones: list[ExclusiveZone],
+    period: float,
+    late: tuple[int, ...],
+    chosen: tuple[WaitMode | None, ...],
+) -> float:
+    """Unknown: the begin of the second robot, then of each movement its seconds, its joules and the
+    wait before it; the first robot's first movement begins at 0.
+    """
+    curves = [curve for work in works for curve in work.movements]
+    firsts = (0, len(works[0].movements))
+    size = 1 + 3 * len(curves)
+    rows: list[np.ndarray] = []
+    right: list[float] = []
+
+    def at_most(row: np.ndarray, bound: float) -> None:
+        rows.append(row)
+        right.append(bound)
+
+    cost = np.zeros(size)
+    bounds: list[tuple[float | None, float | None]] = [(-period, period)]
+    for k, (curve, mode) in enumerate(zip(curves, chosen, strict=True)):
+        own = 1 + 3 * k
+        cost[own + 1] = 1.0
+        cost[own + 2] = 0.0 if mode is None else mode.watts
+        bounds += [(curve.seconds[0], curve.seconds[-1]), (None, None)]
+        bounds.append((0.0, 0.0) if mode is None else (mode.shortest, mode.longest))
+        for (s0, j0), (s1, j1) in pairwise(zip(curve.seconds, curve.joules, strict=True)):
+            row = np.zeros(size)
+            row[own] = (j1 - j0) / (s1 - s0)
+            row[own + 1] = -1.0
+            at_most(row, row[own] * s0 - j0)
+    begins: list[tuple[np.ndarray, float]] = []
+    for robot, work in enumerate(works):
+        here = np.zeros(size)
+        here[0] = float(robot)
+        still = 0.0
+        for k in range(len(work.movements)):
+            if k > 0:
+                here = here.copy()
+                still += work.standing[k][0]
+                here[1 + 3 * (firsts[robot] + k - 1)] = 1.0
+                here[3 + 3 * (firsts[robot] + k)] = 1.0
+            begins.append((here, still))
+        whole = np.zeros(size)
+        own = slice(1 + 3 * firsts[robot], 1 + 3 * (firsts[robot] + len(work.movements)))
+        whole[own][0::3] = 1.0
+        whole[own][2::3] = 1.0
+        standing = sum(seconds for seconds, _ in work.standing)
+        at_most(whole, period - standing)
+        at_most(-whole, standing - period)
+    for zone, cycles in zip(zones, late, strict=True):
+        spans = []
+        for stretch in (zone.one, zone.other):
+            first = firsts[stretch.robot] + stretch.first
+            last = first + stretch.count - 1
+            end = begins[last][0].copy()
+            end[1 + 3 * last] += 1.0
+            spans.append((begins[first], (end, begins[last][1])))
+        (one, one_end), (other, other_end) = spans
+        at_most(one_end[0] - other[0], other[1] - one_end[1] + cycles * period)
+        at_most(other_end[0] - one[0], one[1] - other_end[1] + (1 - cycles) * period)
+    fixed = sum(joules for work in works for _, joules in work.standing)
+    fixed += sum(mode.joules for mode in chosen if mode is not None)
+    answer = linprog(cost, A_ub=np.array(rows), b_ub=right, bounds=bounds, method="highs")
+    return float(answer.fun) + fixed if answer.status == 0 else np.inf
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.long) for k in (1, 2, 3))])
+@pytest.mark.parametrize("factor", [1.001, 1.4])
+def test_brute_force_over_orders_and_modes_agrees(seed: int, factor: float) -> None:
+    rng = np.random.default_rng([seed, 11])
+    works = [drawn_work(rng, 2), drawn_work(rng, 3)]
+    zones = [ExclusiveZone(ZoneStretch(0, 0, 1), ZoneStretch(1, int(rng.integers(2)), 1))]
+    if seed > 1:
+        zones.append(ExclusiveZone(ZoneStretch(0, 1, 1), ZoneStretch(1, 2, 1)))
+    fastest = shortest_joint(works, zones)
+    assert fastest is not None
+    period = factor * fastest.period
+    least = least_by_orders(works, zones, period, range(-1, 3))
+    cycle = cheapest(works, zones, period)
+    assert cycle.joules == pytest.approx(least, rel=1e-6)
+    assert cycle.bound == pytest.approx(least, rel=1e-6)
 
 
 def test_who_has_to_be_first_is_and_both_cannot_be() -> None:
