@@ -13,6 +13,7 @@ from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from ir_msgs_py.ros import parameters
 from ir_msgs_py.ros.parameters import Parameters, check_names
 from ir_values.errors import InvalidValueError
 from ir_values.settings import setting
@@ -195,9 +196,21 @@ def test_ten_megabytes_are_refused_in_a_sentence(ask):
 def test_more_parameters_than_a_request_may_have_are_refused_as_one(ask):
     (result,) = ask(SetParameters, "set_parameters", [SPEED] * 20_000).results
     assert not result.successful
-    assert result.reason == "20000 parameters in one request: at most 500 are taken"
+    assert result.reason == "more than 500 parameters in one request: nothing of it is done"
     whole = ask(SetParametersAtomically, "set_parameters_atomically", [SPEED] * 501).result
-    assert "501 parameters" in whole.reason
+    assert "more than 500 parameters" in whole.reason
     assert all(
         each.successful for each in ask(SetParameters, "set_parameters", [SPEED] * 500).results
     )
+
+
+def test_what_is_beyond_is_not_even_converted(ask, ros_executor, monkeypatch):
+    """rclpy holds the interpreter while it converts: 20,000 parameters kept a stop waiting."""
+    seen = []
+    entries = parameters._entries
+    monkeypatch.setattr(
+        parameters, "_entries", lambda request: seen.append(entries(request)) or seen[-1]
+    )
+    for count in (0, 500, 501, 20_000):
+        ask(SetParameters, "set_parameters", [SPEED] * count)
+    assert seen == [0, 500, 501, 501]

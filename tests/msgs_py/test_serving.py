@@ -26,6 +26,7 @@ from ir_msgs_py.ros.serving import (
     BoundedService,
     RecordedActionServer,
     RequestQueue,
+    TakenGoals,
     gone,
 )
 from ir_msgs_py.ros.spinning import BackgroundExecutor
@@ -357,3 +358,13 @@ def test_whatever_a_handler_does_its_client_is_answered_and_the_next_one_too(
     assert all(status.message.isprintable() and len(status.message) < 5_000 for status in statuses)
     assert all("unexpected" in status.message for status in statuses)
     assert len(said) == 2
+
+
+def test_of_goals_that_are_never_accepted_the_oldest_are_forgotten() -> None:
+    noted = TakenGoals[int]()
+    for k in range(5_000):
+        noted.note(k.to_bytes(16, "big"), k)
+    assert noted.pop((0).to_bytes(16, "big"), -1) == -1
+    newest = (4_999).to_bytes(16, "big")
+    assert noted.pop(newest, -1) == 4_999
+    assert noted.pop(newest, -1) == -1

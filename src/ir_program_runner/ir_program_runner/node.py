@@ -31,7 +31,7 @@ from ir_msgs_py.ros.node_process import run_node
 from ir_msgs_py.ros.parameters import Parameters
 from ir_msgs_py.ros.plan_conversions import planned_movement_from_msg
 from ir_msgs_py.ros.power_conversions import program_state_to_msg, signal_from_msg, signal_to_msg
-from ir_msgs_py.ros.serving import RecordedActionServer
+from ir_msgs_py.ros.serving import RecordedActionServer, TakenGoals
 from ir_msgs_py.ros.topics import ACTION_SERVICES, BURST, COMMANDS, CommandTopic
 from ir_msgs_py.ros.waiting import Waiting
 from ir_msgs_py.status import Status, StatusCode
@@ -121,7 +121,6 @@ small.
 _MOST_STATE = 65_536  # bytes that a step announces; a planned one has two thousand
 _SIGNALS = COMMANDS[0]  # a driver that starts later hears them too
 _FEEDBACK_PERIOD = 0.2  # s: a person reads no faster
-_ASKED_KEPT = 1_000
 _MACHINES_PERIOD = 0.02  # s: cycle of the soft PLC, as a small real one has
 
 
@@ -168,8 +167,8 @@ class ProgramRunnerNode(Node):
         self._machines = _machines_of(links) if machines is None else machines
         self._waiting = Waiting(self)
         self._planner = PlannerClient(self, self._waiting, links.planner, links.response_timeout)
-        self._sender_knows: int | None = None
-        self._asked: dict[bytes, int | None] = {}
+        self._known_stop: int | None = None
+        self._known_stops = TakenGoals[int | None]()
         self._driver = self._link_to_driver(links)
         self._machine_time = MachineTime(self._plant_time, lambda: node_time(self))
         self._jump = ""
@@ -214,14 +213,12 @@ class ProgramRunnerNode(Node):
 
     def _look_for_goals(self) -> None:
         """Goals that wait when a stop is heard were sent before it: take them as such."""
-        if self._sender_knows != self._driver.stops and self._server.take_waiting(BURST):
-            self._sender_knows = self._driver.stops
+        if self._known_stop != self._driver.stops and self._server.take_waiting(BURST):
+            self._known_stop = self._driver.stops
 
     def _note_stop(self, goal_id: bytes) -> None:
         """A goal is taken: note the last stop that its sender can have known."""
-        while len(self._asked) >= _ASKED_KEPT:  # of goals that rclpy has not accepted
-            self._asked.pop(next(iter(self._asked)), None)
-        self._asked[goal_id] = self._sender_knows
+        self._known_stops.note(goal_id, self._known_stop)
 
     def destroy_node(self) -> None:
         """Let go of the action server before the node."""
@@ -239,7 +236,7 @@ class ProgramRunnerNode(Node):
         self._progress = progress = RunProgress(
             goal.request.program_id, (), self._driver.plant_time
         )
-        after_stop = self._asked.pop(bytes(goal.goal_id.uuid), self._driver.stops)
+        after_stop = self._known_stops.pop(bytes(goal.goal_id.uuid), self._driver.stops)
         try:
             status, movements = await self._fetch(goal.request)
             # a driver or a /clock that has just been started gets the time to be discovered

@@ -27,6 +27,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.service_introspection import ServiceIntrospectionState
 
+from ir_msgs_py.ros.c_messages import Convert, CSequence, converter, lookalike
 from ir_msgs_py.ros.rclpy_inside import given_names
 from ir_msgs_py.ros.serving import ANY, Calls
 from ir_values.errors import InvalidValueError, IrError, one_line
@@ -49,12 +50,38 @@ def answer_always(node: Node) -> None:
             service.callback, "guarded"
         ):
             service.callback = _guarded(service.callback)
+            service.srv_type = _cut(service.srv_type)
+
+
+def _cut(service_type: Any) -> Any:
+    """The type of a service that converts no more of a request's entries than tell that they are
+    too many: rclpy takes a second for ten thousand, and holds the interpreter meanwhile.
+
+    Requests of all these services begin with the list of their entries.
+    """
+    metaclass = type(service_type.Request)
+    convert = converter(metaclass)
+    if convert is None:
+        return service_type
+
+    def cut(message: int) -> Any:
+        entries = CSequence.from_address(message)
+        entries.size = min(entries.size, MOST_ENTRIES + 1)
+        return convert(message)
+
+    kept = Convert(cut)
+    own = {
+        "Request": lookalike(metaclass, kept),
+        "kept": kept,
+        "__module__": service_type.__module__,
+    }
+    return type(service_type)(service_type.__name__, (service_type,), own)
 
 
 def _guarded(callback: Callback) -> Callback:
     def answer(request: Any, response: Any) -> Any:
-        if (count := _entries(request)) > MOST_ENTRIES:
-            return _refused_whole(request, response, count)
+        if _entries(request) > MOST_ENTRIES:
+            return _refused_whole(response)
         try:
             response = callback(request, response)
         except ANY as error:
@@ -68,13 +95,13 @@ def _guarded(callback: Callback) -> Callback:
 
 
 def _entries(request: Any) -> int:
-    """How many parameters a request is about; lists of prefixes are short work."""
-    return len(getattr(request, "parameters", ()) or getattr(request, "names", ()))
+    """How many parameters or prefixes a request names."""
+    return max(len(getattr(request, name, ())) for name in ("parameters", "names", "prefixes"))
 
 
-def _refused_whole(request: Any, response: Any, count: int) -> Any:
+def _refused_whole(response: Any) -> Any:
     """Nothing of the request is done; one result says so for all."""
-    reason = f"{count} parameters in one request: at most {MOST_ENTRIES} are taken"
+    reason = f"more than {MOST_ENTRIES} parameters in one request: nothing of it is done"
     refusal = SetParametersResult(successful=False, reason=reason)
     if isinstance(response, SetParameters.Response):
         response.results = [refusal]

@@ -14,7 +14,7 @@ import traceback
 from collections import deque
 from collections.abc import Callable, Iterable
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Generic, TypeVar
 from weakref import WeakKeyDictionary, WeakSet
 
 from rclpy.callback_groups import CallbackGroup
@@ -51,7 +51,10 @@ MOST_WAITING = 64 * 2**20
 WAITING = 100
 LOOK = 0.05
 """s between two looks whether a client is still there: each takes a third of a millisecond."""
+_TAKEN_KEPT = 1000  # goals
 _NUMBER = 8  # bytes; what a number takes at most
+T = TypeVar("T")
+U = TypeVar("U")
 
 
 class Calls:
@@ -330,6 +333,25 @@ class BoundedService(Waitable):
         response = self._type.Response()
         self._put(response, Status(status.code, status.message, self._source))
         return response
+
+
+class TakenGoals(Generic[T]):
+    """What is noted of goals when they are taken from the middleware, until they are accepted. The
+    oldest go first: rclpy doesn't accept every one.
+    """
+
+    def __init__(self) -> None:
+        self._noted: dict[bytes, T] = {}
+
+    def note(self, goal_id: bytes, value: T) -> None:
+        """Note it of a goal."""
+        while len(self._noted) >= _TAKEN_KEPT:
+            self._noted.pop(next(iter(self._noted)), None)
+        self._noted[goal_id] = value
+
+    def pop(self, goal_id: bytes, otherwise: U) -> T | U:
+        """What was noted, asked once; `otherwise` where nothing was, or too long ago."""
+        return self._noted.pop(goal_id, otherwise)
 
 
 class RecordedActionServer(PatientActionServer):

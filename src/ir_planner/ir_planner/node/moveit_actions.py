@@ -12,6 +12,7 @@ from time import monotonic, sleep
 from typing import Any
 from weakref import WeakSet
 
+from ir_msgs_py.ros.serving import TakenGoals
 from ir_msgs_py.ros.spinning import Cancellation
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.node.moveit_scene import refusal
@@ -22,7 +23,6 @@ EXECUTE = "execute_trajectory"
 STOP = "stop"
 _MOMENT = 1e-3  # s between two looks
 _PATIENCE = 5.0  # s that rclpy may take from a cancel's callback to the goal's state
-_CAME_KEPT = 1_000
 _SUCCESSFUL = 0  # of control_msgs/FollowJointTrajectory
 _REFUSED = (-1, -2, -3)  # there: the goal, its joints, its stamp
 _CONTROL_FAILED = -4  # of moveit_msgs/MoveItErrorCodes
@@ -118,19 +118,17 @@ class AcceptedGoals:
 
     def __init__(self, executor: TrajectoryExecution) -> None:
         self._executor = executor
-        self._came: dict[bytes, Cancellation] = {}
+        self._taken = TakenGoals[Cancellation]()
         self._goals: dict[bytes, _Accepted] = {}
 
     def came(self, goal_id: bytes) -> None:
         """A goal is taken from the middleware: a stop that is heard from now on ends it."""
-        while len(self._came) >= _CAME_KEPT:  # of goals that rclpy has not accepted
-            self._came.pop(next(iter(self._came)), None)
-        self._came[goal_id] = self._executor.accept()
+        self._taken.note(goal_id, self._executor.accept())
 
     def add(self, goal: Any) -> None:
         """A goal is accepted."""
         key = bytes(goal.goal_id.uuid)
-        stopped = self._came.pop(key, None)
+        stopped = self._taken.pop(key, None)
         self._goals[key] = _Accepted(self._executor.accept() if stopped is None else stopped)
 
     def stopped(self, goal: Any) -> Cancellation:

@@ -2,10 +2,9 @@
 
 rclpy converts a request while it holds the interpreter, some 10 us for each point: the plant's
 thread, and a press of the emergency stop, would wait 0.2 s for a goal of 20,000 points, and a
-second for one of 100,000 that is refused anyway. rclpy asks the message's class for the
-function that converts it; here it gets one that looks at the C message first, leaves out the
-points of what is refused, and converts the others one by one, so that other threads run in
-between.
+second for one of 100,000 that is refused anyway. Here the C message is looked at first: the points
+of what is refused are left out, and the others are converted one by one, so that other threads run
+in between.
 """
 
 from __future__ import annotations
@@ -20,26 +19,12 @@ import numpy as np
 from rclpy.serialization import deserialize_message
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from ir_msgs_py.ros.c_messages import Convert, CSequence, converter, lookalike
 from ir_msgs_py.ros.rclpy_inside import part, participant_of
-from ir_msgs_py.ros.serving import RecordedActionServer
+from ir_msgs_py.ros.serving import RecordedActionServer, TakenGoals
 
-_CLIENTS_KEPT = 1000
 _NAMES_MAX = 100  # joints, tolerances and states of a goal: a robot has ten
 _AT_ONCE = 50  # points that are converted without a pause for other threads, half a millisecond
-_Convert = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p)
-_api = ctypes.pythonapi
-_api.PyCapsule_GetName.restype = ctypes.c_char_p
-_api.PyCapsule_GetName.argtypes = [ctypes.py_object]
-_api.PyCapsule_GetPointer.restype = ctypes.c_void_p
-_api.PyCapsule_GetPointer.argtypes = [ctypes.py_object, ctypes.c_char_p]
-_api.PyCapsule_New.restype = ctypes.py_object
-_api.PyCapsule_New.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p]
-
-
-class _Sequence(ctypes.Structure):
-    """Of rosidl_runtime_c; a string has the same layout."""
-
-    _fields_ = (("data", ctypes.c_void_p), ("size", ctypes.c_size_t), ("capacity", ctypes.c_size_t))
 
 
 class _Trajectory(ctypes.Structure):
@@ -47,9 +32,9 @@ class _Trajectory(ctypes.Structure):
 
     _fields_ = (
         ("stamp", ctypes.c_int32 * 2),
-        ("frame_id", _Sequence),
-        ("joint_names", _Sequence),
-        ("points", _Sequence),
+        ("frame_id", CSequence),
+        ("joint_names", CSequence),
+        ("points", CSequence),
     )
 
 
@@ -66,7 +51,7 @@ def _layout(goal: Any) -> Any:
     """
     fields = list(goal.get_fields_and_field_types().items())[2:]
     lists = [name for name, _ in takewhile(lambda each: each[1].startswith("sequence<"), fields)]
-    own = {"_fields_": (*_HEAD, *((name, _Sequence) for name in lists)), "lists": lists}
+    own = {"_fields_": (*_HEAD, *((name, CSequence) for name in lists)), "lists": lists}
     return type("GoalRequest", (ctypes.Structure,), own)
 
 
@@ -74,10 +59,10 @@ class _Point(ctypes.Structure):
     """A JointTrajectoryPoint."""
 
     _fields_ = (
-        ("positions", _Sequence),
-        ("velocities", _Sequence),
-        ("accelerations", _Sequence),
-        ("effort", _Sequence),
+        ("positions", CSequence),
+        ("velocities", CSequence),
+        ("accelerations", CSequence),
+        ("effort", CSequence),
         ("time_from_start", ctypes.c_int32 * 2),
     )
 
@@ -85,17 +70,7 @@ class _Point(ctypes.Structure):
 _WORDS = ctypes.sizeof(_Point) // 8  # of a point; every third of the first twelve is a size
 
 
-def _converter(kind: Any) -> Callable[[int], Any] | None:
-    """The function that makes an object of a C message of this class; None where it has none."""
-    if part(kind, "_CONVERT_TO_PY") is None:
-        kind.__import_type_support__()
-    capsule = part(kind, "_CONVERT_TO_PY")
-    if capsule is None:
-        return None
-    return _Convert(_api.PyCapsule_GetPointer(capsule, _api.PyCapsule_GetName(capsule)))
-
-
-def _bytes_of(points: _Sequence) -> int:
+def _bytes_of(points: CSequence) -> int:
     """Bytes of the numbers in a C sequence of points, which need not be six each."""
     if not points.size:
         return 0
@@ -105,14 +80,14 @@ def _bytes_of(points: _Sequence) -> int:
 
 
 def _converted(
-    convert: Callable[[int], Any], message: int, points: _Sequence
+    convert: Callable[[int], Any], message: int, points: CSequence
 ) -> tuple[Any, list[Any]]:
     """The message without its points, and the points, made one by one."""
     size = points.size
     points.size = 0
     whole = convert(message)
     points.size = size
-    one = _converter(JointTrajectoryPoint)
+    one = converter(JointTrajectoryPoint)
     assert one is not None  # its trajectory has one
     made = []
     for k in range(size):
@@ -142,7 +117,7 @@ class _CountedRequest:
 
     def __init__(self, request: Any, admit: Admit, known: Callable[[bytes], bool]) -> None:
         kind = type(request)
-        convert = _converter(kind)
+        convert = converter(kind)
         self.admission = Admission()
         self.as_class: Any = request
         if convert is None:
@@ -162,8 +137,8 @@ class _CountedRequest:
             whole.goal.trajectory._points = made
             return whole
 
-        self._kept = _Convert(counted)
-        self.as_class = _lookalike(kind, self._kept)
+        self._kept = Convert(counted)
+        self.as_class = lookalike(kind, self._kept)
 
 
 def _judged(head: Any, admit: Admit) -> Admission:
@@ -198,18 +173,6 @@ def _emptied(head: Any) -> None:
         each.size = each.size if each.size <= _NAMES_MAX else 0
 
 
-def _lookalike(kind: Any, convert: Any) -> Any:
-    """A class that rclpy takes for `kind`, whose messages `convert` makes."""
-    pointer = ctypes.cast(convert, ctypes.c_void_p)
-    own = {
-        "_TYPE_SUPPORT": kind._TYPE_SUPPORT,
-        "_CREATE_ROS_MESSAGE": kind._CREATE_ROS_MESSAGE,
-        "_DESTROY_ROS_MESSAGE": kind._DESTROY_ROS_MESSAGE,
-        "_CONVERT_TO_PY": _api.PyCapsule_New(pointer, None, None),
-    }
-    return type("Lookalike", (), own)()
-
-
 class BoundedActionServer(RecordedActionServer):
     """An action server of goals that begin with a trajectory; admit: asked before a goal is
     converted.
@@ -217,7 +180,7 @@ class BoundedActionServer(RecordedActionServer):
 
     def __init__(self, node: Any, action_type: Any, *arguments: Any, admit: Admit, **options: Any):
         self._admissions: dict[bytes, Admission] = {}
-        self._clients: dict[bytes, bytes] = {}
+        self._clients = TakenGoals[bytes]()
         self._counted = _CountedRequest(
             action_type.Impl.SendGoalService.Request, admit, self._is_known
         )
@@ -241,9 +204,7 @@ class BoundedActionServer(RecordedActionServer):
     def goal_came(self, request_id: Any, request: Any) -> None:
         """Note who has sent the goal, and what the driver said of it."""
         key = bytes(request.goal_id.uuid)
-        while len(self._clients) >= _CLIENTS_KEPT:  # of goals that rclpy has not accepted
-            self._clients.pop(next(iter(self._clients)), None)
-        self._clients[key] = participant_of(request_id)
+        self._clients.note(key, participant_of(request_id))
         if self._counted.admission != Admission():
             self._admissions[key] = self._counted.admission
 
@@ -252,7 +213,7 @@ class TrajectoryReader:
     """Reads JointTrajectories from bytes, point by point, so that other threads run in between."""
 
     def __init__(self) -> None:
-        convert = _converter(JointTrajectory)
+        convert = converter(JointTrajectory)
         self._class: Any = JointTrajectory
         if convert is None:
             return
@@ -263,8 +224,8 @@ class TrajectoryReader:
             whole._points = made
             return whole
 
-        self._kept = _Convert(parted)
-        self._class = _lookalike(JointTrajectory, self._kept)
+        self._kept = Convert(parted)
+        self._class = lookalike(JointTrajectory, self._kept)
 
     def read(self, data: bytes) -> Any:
         """The message. Raises what rclpy raises for bytes that are none."""
