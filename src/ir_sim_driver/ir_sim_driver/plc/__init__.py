@@ -3,19 +3,15 @@ by.
 """
 
 from ir_sim_driver.plc.inputs import (
-    LINKS,
     OFF_BIT,
     OWN_BITS,
-    SERVICE,
-    TOPIC,
-    WRITERS,
     Plc,
     PlcSettings,
     Watchdog,
     Written,
     giver_of,
-    usable_links,
 )
+from ir_sim_driver.plc.links import LINKS, SERVICE, TOPIC, WRITERS, usable_links
 from ir_sim_driver.plc.port import STOP_BIT, Controller, Link, OpenLink, Readout
 from ir_sim_driver.plc.wake_listener import WakeOnLan
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import dataclass, replace
 from math import inf
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple
 
 from ir_msgs_py.modes import REST_OF_BIT, ROW, Mode
 from ir_msgs_py.plc import PLC_INPUT_NAMES, OperatingMode, PlcInputs
@@ -14,52 +13,9 @@ from ir_msgs_py.status import StatusCode
 from ir_sim_driver.emergency_stop import StopMachine
 from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.notices import Level, Notices
-from ir_sim_driver.plc.modbus import ModbusTcp
-from ir_sim_driver.plc.port import STOP_BIT, Link
-from ir_sim_driver.plc.wake_listener import WakeOnLan
-from ir_values.errors import InvalidValueError, shown
-from ir_values.extensions import Registry
-from ir_values.settings import check_settings, describe, setting
-
-# Links that there are: a new one is a module and a line here, or an entry point of an installed
-# package.
-
-
-def _made_link(name: str, value: Any) -> type[Link]:
-    """The link of an entry point. Raises InvalidValueError; nobody asks for a link by installing
-    its package.
-    """
-    if not (isinstance(value, type) and is_dataclass(value) and hasattr(value, "open")):
-        raise InvalidValueError("must be a frozen dataclass with a method open")
-    link = cast(type[Link], value)
-    if link.name != name:
-        raise InvalidValueError(f"has the name {shown(link.name)}: both must be the same")
-    describe(link)
-    if link().wanted:
-        raise InvalidValueError("opens by its defaults: a setting must ask for it")
-    return link
-
-
-LINKS: Registry[type[Link]] = Registry(
-    "ir_sim_driver.links", {link.name: link for link in (WakeOnLan, ModbusTcp)}, _made_link
-)
-TOPIC = "topic"
-SERVICE = "service"
-WRITERS = (
-    TOPIC,
-    *(name for name in LINKS if name not in LINKS.own or LINKS.own[name].sets_inputs),
-    SERVICE,
-)
-"""Who may set PLC inputs: the node's topic and service, and links."""
-
-
-def usable_links() -> tuple[type[Link], ...]:
-    """All links; warns (RuntimeWarning) of an installed package that can't be used."""
-    refused = {name: why for name in LINKS if (why := LINKS.why_not(name))}
-    for why in refused.values():
-        warnings.warn(why, RuntimeWarning, stacklevel=2)
-    return tuple(LINKS[name] for name in LINKS if name not in refused)
-
+from ir_sim_driver.plc.links import SERVICE, WRITERS
+from ir_sim_driver.plc.port import STOP_BIT
+from ir_values.settings import check_settings, setting
 
 # Heartbeat of the PLC, watched from the first one on, in plant time.
 
