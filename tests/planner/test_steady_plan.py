@@ -147,6 +147,20 @@ def test_a_program_in_which_slots_take_long_to_repeat_is_refused(
         planner.plan_steady_cycle()
 
 
+def test_machines_that_can_be_full_in_too_many_ways_are_refused_before_anything_is_planned(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(steady_plan, "_CONTENTS_MAX", 700)
+    monkeypatch.setattr(steady_plan, "planned_columns", None)
+    machines = tuple(
+        replace(machine, capacity=4, buffer=4) if machine.process else machine
+        for machine in CELL.equipment
+    )
+    planner = Planner(replace(CELL, equipment=machines), clock=lambda: 0.0)
+    with pytest.raises(RequestError, match="can hold parts in 729 ways, at most 700"):
+        planner.plan_steady_cycle()
+
+
 def test_every_movement_is_certified_and_the_robot_is_back_where_it_began() -> None:
     plan = at_thirty()
     assert plan.program is not None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -376,13 +377,6 @@ class _TendingModel:
         }
         machines = [cell.machine(name) for name in machines_of(cell)[1:-1]]
         self._room = [np.inf, *(each.places for each in machines), np.inf]
-        ways = np.prod([1.0 + room for room in self._room[1:-1]])
-        if ways > _CONTENTS_MAX:
-            raise RequestError(
-                StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"the machines of the route can hold parts in {ways:.0f} ways, at most "
-                f"{_CONTENTS_MAX} are planned: give fewer a capacity or a buffer",
-            )
         self.problem = SteadyProblem(
             activities=tuple(self._activity(a) for a in range(len(visits) - 1)),
             hops={arc: tending.columns[key].curve for arc, key in self._hops().items()},
@@ -500,6 +494,17 @@ class _TendingModel:
         return replace(self.problem, own=own, own_hops=hops)
 
 
+def _check_contents(cell: Cell) -> None:
+    """Raise RequestError where the machines of the route can be full in too many ways."""
+    ways = math.prod(1 + cell.machine(name).places for name in machines_of(cell)[1:-1])
+    if ways > _CONTENTS_MAX:
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"the machines of the route can hold parts in {ways} ways, at most {_CONTENTS_MAX} "
+            "are planned: give fewer a capacity or a buffer",
+        )
+
+
 class _Ways:
     """The ways of a part through the cell, each with its model; the first one has the fewest
     visits. Raises StageError where no way can be driven.
@@ -511,6 +516,7 @@ class _Ways:
         for way in request.cell.part_routes:
             route = replace(way, by_states=False)
             own = replace(request, cell=replace(request.cell, route=route))
+            _check_contents(own.cell)
             try:
                 tending = planned_columns(own, route, context)
             except StageError as failed:
