@@ -161,6 +161,19 @@ def test_machines_that_can_be_full_in_too_many_ways_are_refused_before_anything_
         planner.plan_steady_cycle()
 
 
+def without(cell: Cell, name: str) -> Cell:
+    """The cell with a machine that is switched off."""
+    machines = tuple(replace(machine, enabled=machine.name != name) for machine in cell.equipment)
+    return replace(cell, equipment=machines)
+
+
+@pytest.mark.parametrize("name", ["infeed", "lathe", "gauge"])
+def test_a_machine_that_is_switched_off_is_not_visited(name: str) -> None:
+    planner = Planner(without(CELL, name), clock=lambda: 0.0)
+    with pytest.raises(RequestError, match=f"of {name}, which is switched off"):
+        planner.plan_steady_cycle()
+
+
 def test_every_movement_is_certified_and_the_robot_is_back_where_it_began() -> None:
     plan = at_thirty()
     assert plan.program is not None
@@ -411,3 +424,15 @@ def test_a_buffer_is_used_where_that_pays_and_parts_go_through_it() -> None:
         *("gauge_seat",) * 2,
         "outfeed_place",
     ]
+
+
+@pytest.mark.parametrize("name", ["gauge", "washer"])
+def test_a_way_by_states_goes_without_a_machine_that_is_switched_off(name: str) -> None:
+    cell = without(with_buffer(at_will=True), name)
+    if name == "washer":
+        with pytest.raises(RequestError, match="of washer, which is switched off"):
+            Planner(cell, clock=lambda: 0.0).plan_steady_cycle()
+    else:
+        assert len(cell.part_routes) == 2
+        plan = Planner(cell, clock=lambda: 0.0).plan_steady_cycle()
+        assert plan.stations == ("infeed_pick", "washer_basket", "outfeed_place")

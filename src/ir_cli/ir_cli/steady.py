@@ -25,6 +25,7 @@ from ir_planner.flexible import (
 from ir_recorder.report.files import write_output
 from ir_studies.cells import tended_instance, written
 from ir_studies.errors import StudyError
+from ir_values.errors import unknown_name
 from ir_values.files import ANYWHERE
 
 HOUR = 3600.0
@@ -94,6 +95,7 @@ def run_steady(arguments: argparse.Namespace, report: Report) -> int:
     with sentences():
         planner = planner_of(arguments.cell, arguments.power_parameters)
         given = planner.cell
+        _check_surprises(arguments, given)
         plan = planner.plan_steady_cycle(
             parts_per_hour=arguments.parts_per_hour,
             options=options_of(arguments),
@@ -281,8 +283,19 @@ _COUNTED: Columns = {
 }
 
 
-def _outage(plan: SteadyPlan, asked: str) -> str:
-    """What an outage costs by each policy."""
+def _check_surprises(arguments: argparse.Namespace, cell: Cell) -> None:
+    """Raise InputError for surprises that the cell can't have."""
+    if arguments.outage:
+        machine, _ = _outage_asked(arguments.outage)
+        working = [each.name for each in cell.equipment if each.process > 0.0]
+        if machine not in working:
+            raise InputError(unknown_name("machine with a process", machine, working))
+    if arguments.vary and all(machine.process_times is None for machine in cell.equipment):
+        raise InputError("--vary needs a machine whose process has between or samples")
+
+
+def _outage_asked(asked: str) -> tuple[str, float]:
+    """The machine that is down, and for how long [s]."""
     machine, _, value = asked.partition("=")
     try:
         seconds = float(value)
@@ -292,6 +305,12 @@ def _outage(plan: SteadyPlan, asked: str) -> str:
         raise InputError(
             f"--outage is {asked[:60]!r}: it must be MACHINE=S with S in (0, {_LONGEST_OUTAGE:g}]"
         )
+    return machine, seconds
+
+
+def _outage(plan: SteadyPlan, asked: str) -> str:
+    """What an outage costs by each policy."""
+    machine, seconds = _outage_asked(asked)
     middle = len(plan.process)
     replay = outage_replay(plan, machine, seconds, middle, _OUTAGES)
     said = ", ".join(f"{replay.joules(name) / 1e3:.1f} kJ {words}" for name, words in _WAITED)
@@ -303,8 +322,6 @@ def _outage(plan: SteadyPlan, asked: str) -> str:
 
 def _varied(arguments: argparse.Namespace, planner: Planner, cell: Cell) -> list[Row]:
     """Plans that count with different times."""
-    if all(machine.process_times is None for machine in cell.equipment):
-        raise InputError("--vary needs a machine whose process has between or samples")
     rows: list[Row] = []
     for share in (0.0, *SHARES):
         planner.set_cell(with_counted_times(cell, share))

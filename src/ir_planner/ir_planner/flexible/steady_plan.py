@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ir_description import Cell
+from ir_description.cell import PartRoute
 from ir_msgs_py.modes import DEEPER
 from ir_msgs_py.report import PlanningInfo
 from ir_msgs_py.status import Status, StatusCode
@@ -494,6 +495,25 @@ class _TendingModel:
         return replace(self.problem, own=own, own_hops=hops)
 
 
+def _ways_that_are_there(cell: Cell) -> list[PartRoute]:
+    """The ways of a part over machines that are switched on. Raises RequestError where there is
+    none.
+    """
+    off = {
+        way: [name for name in way.visits if not cell.machine(cell.station(name).equipment).enabled]
+        for way in cell.part_routes
+    }
+    there = [way for way, missing in off.items() if not missing]
+    if not there:
+        station = next(iter(off.values()))[0]
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"the route visits {station} of {cell.station(station).equipment}, which is switched "
+            "off: it must be enabled, or the route go without it",
+        )
+    return there
+
+
 def _check_contents(cell: Cell) -> None:
     """Raise RequestError where the machines of the route can be full in too many ways."""
     ways = math.prod(1 + cell.machine(name).places for name in machines_of(cell)[1:-1])
@@ -513,7 +533,7 @@ class _Ways:
     def __init__(self, request: ProgramRequest, context: Context) -> None:
         self._models: list[_TendingModel] = []
         failures = []
-        for way in request.cell.part_routes:
+        for way in _ways_that_are_there(request.cell):
             route = replace(way, by_states=False)
             own = replace(request, cell=replace(request.cell, route=route))
             _check_contents(own.cell)
