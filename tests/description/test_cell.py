@@ -19,8 +19,9 @@ from ir_description import (
     check_cell,
     load_cell,
 )
-from ir_description.cell import Zone, zone_around
+from ir_description.cell import ToolTilt, Zone, zone_around
 from ir_description.poses import composed, inverse, pose_of, rotation_from_abc
+from ir_description.robot import ToolLimits
 from ir_description.shapes import BodyKind, capsule_distance
 from ir_kernels import Chain, CollisionModel
 from ir_values.arrays import FloatArray, solid_box_inertia
@@ -58,6 +59,30 @@ def test_bodies_zone_and_stations_move_with_their_machine(cell: Cell) -> None:
     assert moved.station("infeed_pick").pose == pytest.approx(cell.station("infeed_pick").pose)
     for body, before in zip(new.world_bodies(), old.world_bodies(), strict=True):
         assert body.pose == pytest.approx(move @ before.pose)
+
+
+def test_what_a_station_says_stays_when_its_machine_or_itself_is_moved(cell: Cell) -> None:
+    said = {
+        "limits": ToolLimits(0.5, 3.0, True),
+        "tilt": ToolTilt(0.1),
+        "blend": 0.05,
+        "takes": ("raw",),
+        "gives": "turned",
+        "approach_distance": 0.2,
+    }
+    stations = tuple(replace(station, **said) for station in cell.stations)
+    saying = replace(cell, stations=stations)
+    there = pose_of([0.1, -0.2, 0.3])
+    lathe = cell.station("lathe_work")
+    for moved in (
+        saying.with_equipment("lathe", pose=composed(there, cell.machine("lathe").pose)),
+        saying.with_equipment("lathe", state="door_closed"),
+        saying.with_station("lathe_work", composed(there, lathe.pose_in_equipment)),
+    ):
+        after = moved.station("lathe_work")
+        assert {name: getattr(after, name) for name in said} == said
+        assert after.allowed_contacts == lathe.allowed_contacts
+        assert after.search == lathe.search
 
 
 def test_a_machine_moved_there_and_back_is_written_as_before(cell: Cell) -> None:

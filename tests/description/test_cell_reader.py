@@ -28,6 +28,7 @@ from ir_description import (
     load_robot,
 )
 from ir_description.cell import (
+    BLEND_MAX,
     ZONE_KINDS,
     AllowedContact,
     CellSignal,
@@ -137,7 +138,8 @@ def machines(draw: st.DrawFn, name: str) -> tuple[Equipment, tuple[Station, ...]
         StationSearch, st.just("ccd"), st.integers(1, 10_000), st.sampled_from(["", "tree"])
     )
     search = draw(st.just(StationSearch()) | st.just(StationSearch(withdrawal="modified_ga")) | ccd)
-    return machine, (station_at(machine, f"at_{name}", draw(poses()), contacts, approach, search),)
+    station = station_at(machine, f"at_{name}", draw(poses()), contacts, approach, search)
+    return machine, (replace(station, blend=draw(st.floats(0.0, BLEND_MAX))),)
 
 
 @st.composite
@@ -195,6 +197,7 @@ def cells(draw: st.DrawFn) -> Cell:
                 detach="gear",
                 wait_for=(Signal("open", False),),
                 planner="tree",
+                blend=draw(st.none() | st.floats(0.0, BLEND_MAX)),
             ),
             ProgramStep("PAUSE", dwell=draw(st.floats(0.1, 1000.0)), power_mode="AUTO"),
         ),

@@ -21,6 +21,7 @@ from ir_description.cell.cell import (
 )
 from ir_description.cell.equipment import (
     APPROACH_MAX,
+    BLEND_MAX,
     CAPACITY_MAX,
     CONFIGURATION_SEARCHES,
     PROCESS_MAX,
@@ -69,6 +70,7 @@ from ir_description.cell.robot_cells import ROBOT_COUNT, RobotCells
 __all__ = [
     "APPROACH_MAX",
     "AUTO",
+    "BLEND_MAX",
     "BODIES_MAX",
     "CAPACITY_MAX",
     "CONFIGURATION_SEARCHES",

@@ -19,7 +19,6 @@ from ir_description.cell.equipment import (
     Part,
     Station,
     Zone,
-    station_at,
     zone_around,
 )
 from ir_description.cell.part_routes import check_route, part_routes
@@ -532,15 +531,7 @@ class Cell:
         """Return the cell with a station elsewhere at its machine, whose default zone follows."""
         old = self.station(name)
         machine = self.machine(old.equipment)
-        moved = station_at(
-            machine,
-            name,
-            pose_in_equipment,
-            old.allowed_contacts,
-            old.approach_distance,
-            old.search,
-            old.tilt,
-        )
+        moved = old.moved(machine, pose_in_equipment)
         stations = tuple(moved if station is old else station for station in self.stations)
         mine = [
             tuple(s for s in each if s.equipment == machine.name)
@@ -569,15 +560,7 @@ def check_posture(robot: RobotModel, posture: FloatArray, name: str) -> None:
 def _moved(station: Station, machine: Equipment) -> Station:
     if station.equipment != machine.name:
         return station
-    return station_at(
-        machine,
-        station.name,
-        station.pose_in_equipment,
-        station.allowed_contacts,
-        station.approach_distance,
-        station.search,
-        station.tilt,
-    )
+    return station.moved(machine, station.pose_in_equipment)
 
 
 def _moved_path(path: CellPath, old: Equipment, new: Equipment) -> CellPath:

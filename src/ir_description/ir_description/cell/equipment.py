@@ -21,6 +21,8 @@ from ir_values.errors import InvalidValueError, UnknownNameError
 ZoneKind = Literal["OPEN", "SEMI_CLOSED", "CLOSED"]
 ZONE_KINDS: tuple[ZoneKind, ...] = get_args(ZoneKind)
 APPROACH_MAX = 5.0
+BLEND_MAX = 1.0
+"""m"""
 """Longest approach [m]."""
 ZONE_MAX = 10.0 * SIZE_MAX
 """Largest edge [m] of a zone: it holds bodies far apart."""
@@ -316,7 +318,9 @@ class Station:
     tcp. The allowed contacts hold inside the machine's zone only. tilt: how far the tool may lean
     on the movement to it, None: as it likes. limits: of the movements into and out of it. takes:
     states in which parts of a route may be put down there, (): any; gives: the state in which they
-    are taken, "": not said, or taken by nobody.
+    are taken, "": not said, or taken by nobody. blend [m]: how near a program passes the outer end
+    of its line, and the station where nothing happens there, instead of standing still; 0: it
+    stands still.
     """
 
     name: str
@@ -331,6 +335,7 @@ class Station:
     limits: ToolLimits = UNLIMITED
     takes: tuple[str, ...] = ()
     gives: str = ""
+    blend: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", frozen_pose(self.pose, f"pose of {self.name}"))
@@ -339,6 +344,16 @@ class Station:
         )
         in_range(
             self.approach_distance, 0.0, APPROACH_MAX, "m", f"approach_distance of {self.name}"
+        )
+        in_range(self.blend, 0.0, BLEND_MAX, "m", f"blend of {self.name}")
+
+    def moved(self, machine: Equipment, pose_in_equipment: FloatArray) -> Station:
+        """Return the same station at a pose (4, 4) in the frame of its machine as that stands."""
+        return replace(
+            self,
+            pose=composed(machine.pose, pose_in_equipment),
+            zone=machine.zone_in_equipment.kind,
+            pose_in_equipment=pose_in_equipment,
         )
 
 
@@ -353,6 +368,7 @@ def station_at(
     limits: ToolLimits = UNLIMITED,
     takes: tuple[str, ...] = (),
     gives: str = "",
+    blend: float = 0.0,
 ) -> Station:
     """Return a station of a machine from its pose (4, 4) in the machine's frame."""
     return Station(
@@ -368,6 +384,7 @@ def station_at(
         limits=limits,
         takes=takes,
         gives=gives,
+        blend=blend,
     )
 
 

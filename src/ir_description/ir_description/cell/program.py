@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
-from ir_description.cell.equipment import ToolTilt
+from ir_description.cell.equipment import BLEND_MAX, ToolTilt
 from ir_msgs_py.modes import REST_MODES
 from ir_msgs_py.plc import Signal
 from ir_values.arrays import in_range
@@ -100,6 +100,8 @@ class ProgramStep:
     via: what the movement to the target passes, None: nothing.
     since: the signal that a pause is for, "": it is as long as it says; else it ends as long after
     that was set as planned, so that a late machine shifts what depends on it alone.
+    blend [m]: how near the program passes the target, and the outer end of its line, instead of
+    standing still where nothing happens; None: as the station says.
     """
 
     kind: StepKind
@@ -115,6 +117,7 @@ class ProgramStep:
     tilt: ToolTilt | None = None
     since: str = ""
     via: StepVia | None = None
+    blend: float | None = None
 
     def __post_init__(self) -> None:
         in_range(self.dwell, 0.0, PAUSE_MAX, "s", "dwell")
@@ -132,12 +135,27 @@ class ProgramStep:
             raise InvalidValueError("only a pause has a power mode, or ends after a signal")
         if self.kind == "PAUSE" and self.planner:
             raise InvalidValueError("a pause has no planner")
-        if self.kind not in ("STATION", "POSTURE") and (self.tilt or self.via):
-            raise InvalidValueError("only movements to stations and postures have a tilt or a via")
+        self._check_movement()
         if self.kind != "STATION" and (self.attach or self.detach):
             raise InvalidValueError("parts are attached and detached at stations only")
         if self.attach and self.detach:
             raise InvalidValueError("a step attaches or detaches, not both")
+
+    def _check_movement(self) -> None:
+        """What is said of the movement to the target."""
+        if self.kind not in ("STATION", "POSTURE") and (self.tilt or self.via):
+            raise InvalidValueError("only movements to stations and postures have a tilt or a via")
+        if self.blend is None:
+            return
+        in_range(self.blend, 0.0, BLEND_MAX, "m", "blend")
+        if self.kind not in ("STATION", "POSTURE"):
+            raise InvalidValueError("only stations and postures are passed with a blend")
+        if self.kind == "POSTURE" and self.blend and (self.dwell or self.set_signals):
+            happens = f"dwells {self.dwell:g} s" if self.dwell else "sets signals"
+            raise InvalidValueError(
+                f"blend is {self.blend:g} m at posture {self.target}, where the step {happens}: it "
+                "must be 0 m there"
+            )
 
 
 @dataclass(frozen=True)

@@ -189,6 +189,8 @@ def _station(station: Station) -> Iterator[str]:
     yield f"name: {station.name}"
     yield f"pose: {{{_pose(station.pose_in_equipment)}}}"
     yield f"approach_distance: {_number(station.approach_distance)}"
+    if station.blend:
+        yield f"blend: {_number(station.blend)}"
     if station.tilt is not None:
         yield _tilt(station.tilt)
     search = station.search
@@ -242,10 +244,7 @@ def _step(step: ProgramStep) -> str:
             fields.append(f"dwell: {_number(step.dwell)}")
         if step.planner:
             fields.append(f"planner: {step.planner}")
-        if step.tilt is not None:
-            fields.append(_tilt(step.tilt))
-        if step.via is not None:
-            fields.append(_via(step.via))
+        fields += _of_movement(step)
     for key, part in (("attach", step.attach), ("detach", step.detach)):
         if part:
             fields.append(f"{key}: {part}")
@@ -253,6 +252,16 @@ def _step(step: ProgramStep) -> str:
         if signals:
             fields.append(f"{key}: {_signals(signals)}")
     return f"{{{', '.join(fields)}}}"
+
+
+def _of_movement(step: ProgramStep) -> Iterator[str]:
+    """What a step says of the movement to its target."""
+    if step.tilt is not None:
+        yield _tilt(step.tilt)
+    if step.via is not None:
+        yield _via(step.via)
+    if step.blend is not None:
+        yield f"blend: {_number(step.blend)}"
 
 
 def _via(via: StepVia) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ir_description.cell import (
     APPROACH_MAX,
+    BLEND_MAX,
     BODIES_MAX,
     CAPACITY_MAX,
     CONFIGURATION_SEARCHES,
@@ -412,6 +413,7 @@ _STATION_KEYS = (
     "allowed_contacts",
     "tilt",
     "limits",
+    "blend",
     *_STATE_KEYS,
     *_SEARCH_KEYS,
 )
@@ -432,6 +434,7 @@ def _station(item: Item, machine: Equipment) -> Station:
         _limits(table),
         _taken(table["takes"]) if "takes" in table else (),
         table["gives"].name() if "gives" in table else "",
+        table["blend"].number(0.0, BLEND_MAX, "m") if "blend" in table else 0.0,
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import MISSING, fields
 from typing import Any, TypedDict
 
 from ir_description.cell import (
+    BLEND_MAX,
     NUMBER_MAX,
     PAUSE_MAX,
     PAUSE_POWER_MODES,
@@ -58,14 +59,15 @@ _STEP_KEYS = (
         "via",
         "via_tolerance",
         "via_distance",
+        "blend",
         "since",
     ),
     *_COMMON,
 )
-_VIA = ("via", "via_tolerance", "via_distance")
+_PASSED = ("via", "via_tolerance", "via_distance", "blend")
 _KEYS = {
-    "station": ("station", "dwell", "attach", "detach", "planner", "tilt", *_VIA, *_COMMON),
-    "posture": ("posture", "dwell", "planner", "tilt", *_VIA, *_COMMON),
+    "station": ("station", "dwell", "attach", "detach", "planner", "tilt", *_PASSED, *_COMMON),
+    "posture": ("posture", "dwell", "planner", "tilt", *_PASSED, *_COMMON),
     "path": ("path", "dwell", "planner", *_COMMON),
     "pause": ("pause", "power_mode", "since", *_COMMON),
 }
@@ -145,9 +147,11 @@ def read_step(item: Item) -> ProgramStep:
     }
     tilt = read_tilt(table)
     via = _via(table)
+    blend = table["blend"].number(0.0, BLEND_MAX, "m") if "blend" in table else None
     if kind == "posture":
         posture = table["posture"].choice(POSTURES)
-        return ProgramStep("POSTURE", posture, tilt=tilt, via=via, **moving)
+        with item.blamed():
+            return ProgramStep("POSTURE", posture, tilt=tilt, via=via, blend=blend, **moving)
     if kind == "path":
         return ProgramStep("PATH", table["path"].name(), **moving)
     return ProgramStep(
@@ -157,6 +161,7 @@ def read_step(item: Item) -> ProgramStep:
         detach=table["detach"].name() if "detach" in table else "",
         tilt=tilt,
         via=via,
+        blend=blend,
         **moving,
     )
 
