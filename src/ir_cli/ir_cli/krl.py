@@ -59,6 +59,7 @@ from ir_planner.krl import (
     follow_krl,
     follow_ur,
 )
+from ir_planner.program import AS_THE_CELL_SAYS
 from ir_values.output_files import write_file
 
 UR = ".script"
@@ -215,6 +216,14 @@ def add_export(write: argparse.ArgumentParser) -> None:
         "--cycle-time", type=float, default=0.0, metavar="S", help="for the cycle; 0: free (0)"
     )
     write.add_argument(
+        "--blend",
+        type=float,
+        default=AS_THE_CELL_SAYS,
+        metavar="M",
+        help="pass stops and ends of lines within so many metres where nothing happens; -1: as the "
+        "cell says (-1)",
+    )
+    write.add_argument(
         "--style",
         choices=STYLES,
         default="spline",
@@ -297,6 +306,7 @@ def run_export(arguments: argparse.Namespace) -> int:
         plan = planner.plan_program(
             stations=stations,
             cycle_time=arguments.cycle_time,
+            blend=arguments.blend,
             options=options,
             start=start,
             progress=line.show,

@@ -228,7 +228,8 @@ class PlannedMovement:
     it runs ("gripper+part", "none"). wait_for: signals of the machines to wait for before;
     set_signals: to set after, "name=0" clears; states: of machines that it relies on,
     "lathe=door_open". since: signal that a pause is for, "" for none: it ends as long after that
-    was set as planned.
+    was set as planned. passes: stops that it passes without standing still, which messages don't
+    carry.
     """
 
     kind: str
@@ -246,12 +247,13 @@ class PlannedMovement:
     set_signals: tuple[str, ...] = ()
     states: tuple[str, ...] = ()
     since: str = ""
+    passes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         kind = MovementKind(one_of(self.kind, list(MovementKind), "kind of movement"))
         set_field(self, "kind", kind)
         set_field(self, "duration", at_least(self.duration, 0.0, "duration of the movement", "s"))
-        for name in ("wait_for", "set_signals", "states"):
+        for name in ("wait_for", "set_signals", "states", "passes"):
             set_field(self, name, tuple(getattr(self, name)))
         modes_of(self.power_mode)
         if kind is MovementKind.PAUSE:

@@ -37,6 +37,7 @@ from ir_planner.current_cell import CurrentCell, DriverReports, ReadCell, read_c
 from ir_planner.errors import RequestError, unfit, unknown_name
 from ir_planner.flexible import SteadyPlan, plan_steady_cycle
 from ir_planner.program import (
+    AS_THE_CELL_SAYS,
     PauseLengths,
     ProgramPlan,
     ProgramRequest,
@@ -570,14 +571,16 @@ class Planner:
         cancelled: Cancelled = _NEVER,
         savings: bool = False,
         front_points: int = 0,
+        blend: float = AS_THE_CELL_SAYS,
         **changes: Unpack[OptionFields],
     ) -> ProgramPlan:
         """The cell's program, or a visit of `stations`, from start (n,), None: where it ends, as
         the next cycle follows in production (`Cell.cycle_start`).
 
         cycle_time [s]: 0 = as it costs least. savings: hold it against the common program.
-        front_points: so many programs over the cycle time. progress: called with phase, done, total
-        and the best cost.
+        front_points: so many programs over the cycle time. blend [m]: how near stops and outer ends
+        of their lines are passed where nothing happens, -1: as stations say; steps say it first.
+        progress: called with phase, done, total and the best cost.
         """
         options, note = self._checked(options_with(options, changes))
         cell = self.cell
@@ -597,6 +600,7 @@ class Planner:
             savings=savings,
             front_points=front_points,
             doors=self.heard.doors(cell),
+            blend=blend,
         )
         spreads = Spreads(request)
         stops = max(len(stations or cell.program), 1)  # the ceilings are those of one movement

@@ -93,8 +93,9 @@ def station_of(movement: PlannedMovement) -> str:
     """The station or path whose allowed contacts count in a movement: into it, out of it, along it;
     "" elsewhere.
     """
-    kinds = (MovementKind.SERVICE_EXIT, MovementKind.SERVICE_ENTRY, MovementKind.CARTESIAN)
-    service = movement.kind in kinds
+    if movement.kind == MovementKind.SERVICE_EXIT:
+        return movement.from_station
+    service = movement.kind in (MovementKind.SERVICE_ENTRY, MovementKind.CARTESIAN)
     return movement.to_station if service else ""
 
 

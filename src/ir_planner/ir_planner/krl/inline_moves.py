@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ir_description.cell import POSTURES
 from ir_kernels import portable
 from ir_krl import KrlError
 from ir_krl.write import Style, WrittenMove
@@ -22,7 +23,8 @@ from ir_values.arrays import FloatArray
 # Inline forms can't keep a planned spline. What they keep is that nothing is touched: as few points
 # of the planned movement are taken as the chain of motions needs to be certified again: wherever it
 # comes too near to something, one more. It is driven through, with exact stops where that isn't
-# certified. Then it is slowed to the planned time, where it is quicker and that costs less.
+# certified. Then it is slowed to the planned time, where it is quicker and that costs less. Stops
+# that the movement passes are points of the chain, passed as near as planned or stopped at.
 
 _SAMPLES = 800
 _POINTS_MAX = 40
@@ -30,6 +32,7 @@ _ROUNDED = 0.45  # share of the way to a neighbouring point within which a point
 _TRIALS = 3
 _QUICKER = 0.98
 _TOP = 2.0  # m/s of the tool
+_FARTHER = 0.01  # m, that a stop is passed farther away than planned
 _SERVICE = (MovementKind.SERVICE_ENTRY, MovementKind.SERVICE_EXIT)
 
 
@@ -37,6 +40,7 @@ _SERVICE = (MovementKind.SERVICE_ENTRY, MovementKind.SERVICE_EXIT)
 class _Driven:
     """A chain and what becomes of it; reason: why it isn't certified, "" where it is; violation:
     where it comes too near to something [rad] (n,), None: something else is wrong, everywhere.
+    missed: a stop isn't passed.
     """
 
     moves: list[WrittenMove]
@@ -44,6 +48,7 @@ class _Driven:
     joules: float = 0.0
     reason: str = ""
     violation: FloatArray | None = None
+    missed: bool = False
 
 
 def fitted_moves(
@@ -54,7 +59,7 @@ def fitted_moves(
     scene = evaluator.scene(step)
     q = planned.sample(np.linspace(0.0, planned.duration, _SAMPLES)).q
     reasons = []
-    if step.kind in _SERVICE:
+    if step.kind in _SERVICE and step.from_station == step.to_station and not step.passes:
         line = [replace(one, velocity=_TOP) for one in _through(q[[-1]], scene, straight=True)]
         driven = _evaluated(line, step, evaluator, back)
         if not driven.reason:
@@ -82,13 +87,16 @@ def _refined(
 ) -> _Driven:
     """The chain of fewest points of q (N, n) that is certified, driven through or with stops."""
     scene = evaluator.scene(step)
-    rows = [0, len(q) - 1]
+    near = nearest_to(q, step.passes, scene)
+    rows = sorted({0, *(row for row, _ in near), len(q) - 1})
     while True:
         moves = _through(q[rows[1:]], scene)
         if through and len(moves) > 1:
             moves = _rounded(moves, q[0], scene, style)
         driven = _evaluated(moves, step, evaluator, back)
         if not driven.reason or len(rows) > _POINTS_MAX:
+            return driven
+        if driven.missed:
             return driven
         if driven.violation is None:
             more = max((_between(q, *span) for span in pairwise(rows)), key=lambda one: one[1])[0]
@@ -99,6 +107,44 @@ def _refined(
         if more in rows:
             return driven
         rows = sorted([*rows, more])
+
+
+def nearest_to(
+    q: FloatArray, stops: Sequence[str], scene: PlanningScene
+) -> list[tuple[int, float]]:
+    """The rows of q (N, n) at which the tool comes nearest to stops, one after the other, and how
+    near [m].
+    """
+    tools = scene.chain.tcp_poses(q)[:, :3, 3]
+    found = []
+    first = 0
+    for name in stops:
+        if name in POSTURES:
+            posture = np.array(scene.cell.posture(name))
+            place = scene.chain.tcp_poses(posture[None])[0, :3, 3]
+        else:
+            place = scene.cell.station(name).pose[:3, 3]
+        away = np.linalg.norm(tools[first:] - place, axis=1)
+        first += int(away.argmin())
+        found.append((first, float(away.min())))
+    return found
+
+
+def _missed(again: JointTrajectory, step: PlannedMovement, scene: PlanningScene) -> str:
+    """Why a stop isn't passed as planned, "" where all are."""
+    if not step.passes:
+        return ""
+    planned, driven = (
+        nearest_to(one.sample(np.linspace(0.0, one.duration, _SAMPLES)).q, step.passes, scene)
+        for one in (points_of(step), again)
+    )
+    for name, (_, wanted), (_, away) in zip(step.passes, planned, driven, strict=True):
+        if away > wanted + _FARTHER:
+            return (
+                f"{name} is passed at {1e3 * away:.1f} mm, it must be at most "
+                f"{1e3 * (wanted + _FARTHER):.1f} mm"
+            )
+    return ""
 
 
 def _between(q: FloatArray, first: int, last: int) -> tuple[int, float]:
@@ -145,7 +191,8 @@ def _evaluated(
     found = evaluator(again, step)
     violation = found.verification.violation
     if violation is None:
-        return _Driven(moves, again.duration, found.report.energy)
+        missed = _missed(again, step, evaluator.scene(step))
+        return _Driven(moves, again.duration, found.report.energy, missed, missed=missed != "")
     near = violation.what == "clearance"
     at = again.sample([violation.time]).q[0] if near else None
     return _Driven(moves, reason=violation.sentence, violation=at)

@@ -80,19 +80,36 @@ _AT_STOPS = (MovementKind.SERVICE_ENTRY, MovementKind.CARTESIAN)
 
 
 @dataclass(frozen=True, eq=False)
-class Leg:
-    """How a stop is reached: its movements with their kind, and the scene in which they run."""
+class JoinedMovement:
+    """A movement of several parts of hops, without rest between them; kind: of the part whose
+    station's contacts hold. passes: stops between them.
+    """
 
+    movement: Movement
+    parts: tuple[HopPart, ...]
+    kind: MovementKind
+    passes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class LegMovement:
+    """A movement of a leg: from where to where, and `station`, whose allowed contacts hold."""
+
+    kind: MovementKind
+    movement: Movement
     from_name: str
     to_name: str
-    scene: PlanningScene
-    movements: tuple[tuple[MovementKind, Movement], ...]
+    station: str
+    passes: tuple[str, ...] = ()
 
-    def station_of(self, kind: MovementKind) -> str:
-        """The station or path whose allowed contacts hold in a movement of this kind."""
-        if kind == MovementKind.SERVICE_EXIT:
-            return self.from_name
-        return self.to_name if kind in _AT_STOPS else ""
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """How a stop is reached: its movements, and the scene in which they run."""
+
+    to_name: str
+    scene: PlanningScene
+    movements: tuple[LegMovement, ...]
 
 
 Legs = dict[int, Leg]  # by the step they belong to
@@ -100,12 +117,10 @@ MakePause = Callable[[PlannedPause], PlannedMovement]
 
 
 class Complete(Protocol):
-    """Adds to a step what is said about its movement in a scene, at a station, after what left
-    `charge`.
-    """
+    """Adds to a step what is said about its movement in a scene, after what left `charge`."""
 
     def __call__(
-        self, step: PlannedMovement, movement: Movement, leg: Leg, station: str, charge: Charge
+        self, step: PlannedMovement, made: LegMovement, scene: PlanningScene, charge: Charge
     ) -> PlannedMovement:
         """The step with its report."""
 
@@ -116,9 +131,10 @@ def in_full(reliance: Reliance) -> Complete:
     """
 
     def complete(
-        step: PlannedMovement, movement: Movement, leg: Leg, station: str, charge: Charge
+        step: PlannedMovement, made: LegMovement, scene: PlanningScene, charge: Charge
     ) -> PlannedMovement:
-        states = reliance.of(movement.trajectory, leg.scene, station)
+        movement = made.movement
+        states = reliance.of(movement.trajectory, scene, made.station)
         step = replace(step, report=movement.report, states=states)
         return charge.moved(step, movement.energy, movement.context.scene)
 
@@ -126,25 +142,59 @@ def in_full(reliance: Reliance) -> Complete:
 
 
 def energies_only(
-    step: PlannedMovement, movement: Movement, leg: Leg, station: str, charge: Charge
+    step: PlannedMovement, made: LegMovement, scene: PlanningScene, charge: Charge
 ) -> PlannedMovement:
     """As programs are compared: duration and energies, the same as in full."""
+    movement = made.movement
     energy = charge.taken(movement.energy, movement.context.scene)
     report = TrajectoryReport(duration=step.duration, energy=energy.total, base_energy=energy.base)
     return replace(step, report=report)
 
 
-def legs_of(route: Route, hops: list[list[HopPart]], movements: Mapping[HopPart, Movement]) -> Legs:
-    """The legs of a route from the movements of its parts, hop by hop."""
+def legs_of(
+    route: Route,
+    hops: list[list[HopPart]],
+    movements: Mapping[HopPart, Movement],
+    joined: Sequence[JoinedMovement],
+) -> Legs:
+    """The legs of a route from the movements of its parts, hop by hop; what is joined belongs to
+    the hop where it ends.
+    """
+    ending = {join.parts[-1]: join for join in joined}
+    within = {part for join in joined for part in join.parts[:-1]}
+
+    def made(part: HopPart) -> LegMovement:
+        join = ending.get(part)
+        if join is None:
+            kind = _kind_of(part, route)
+            station = _station_of(kind, route.name(part.hop - 1), route.name(part.hop))
+            here, there = (station,) * 2 if station else _names(part, part, route)
+            return LegMovement(kind, movements[part], here, there, station)
+        here, there = _names(join.parts[0], part, route)
+        station = _station_of(join.kind, here, there)
+        return LegMovement(join.kind, join.movement, here, there, station, join.passes)
+
     return {
         step: Leg(
-            route.name(hop - 1),
             route.name(hop),
             route.arriving(hop),
-            tuple((_kind_of(part, route), movements[part]) for part in hops[hop]),
+            tuple(made(part) for part in hops[hop] if part not in within),
         )
         for hop, step in enumerate(route.stops)
     }
+
+
+def _names(first: HopPart, last: HopPart, route: Route) -> tuple[str, str]:
+    """Between which stops parts lead; the end of a station's line counts as the station."""
+    here = first.hop - (first.kind != ENTER)
+    return route.name(here), route.name(last.hop - (last.kind == LEAVE))
+
+
+def _station_of(kind: MovementKind, here: str, there: str) -> str:
+    """The station or path whose allowed contacts hold in a movement of this kind between stops."""
+    if kind == MovementKind.SERVICE_EXIT:
+        return here
+    return there if kind in _AT_STOPS else ""
 
 
 def _kind_of(part: HopPart, route: Route) -> MovementKind:
@@ -178,7 +228,7 @@ def assembled(
         moves = [] if leg is None else _moves(leg, charge, complete)
         if leg is not None:
             here = leg.to_name
-            q = leg.movements[-1][1].trajectory.positions[-1] if leg.movements else q
+            q = leg.movements[-1].movement.trajectory.positions[-1] if leg.movements else q
         handling = bool(step.attach or step.detach or setting)
         if moves:
             moves[0] = replace(moves[0], wait_for=waiting)
@@ -206,18 +256,19 @@ def assembled(
 
 def _moves(leg: Leg, charge: Charge, complete: Complete) -> list[PlannedMovement]:
     moves = []
-    for kind, movement in leg.movements:
-        station = leg.station_of(kind)
+    for made in leg.movements:
+        trajectory = made.movement.trajectory
         step = PlannedMovement(
-            kind=kind,
-            from_station=station or leg.from_name,
-            to_station=station or leg.to_name,
-            trajectory_id=movement.trajectory.trajectory_id,
-            trajectory=movement.trajectory,
-            duration=movement.trajectory.duration,
+            kind=made.kind,
+            from_station=made.from_name,
+            to_station=made.to_name,
+            trajectory_id=trajectory.trajectory_id,
+            trajectory=trajectory,
+            duration=trajectory.duration,
             load=leg.scene.load_text,
+            passes=made.passes,
         )
-        moves.append(complete(step, movement, leg, station, charge))
+        moves.append(complete(step, made, leg.scene, charge))
     return moves
 
 
@@ -274,23 +325,40 @@ class Choice:
         journal.timing = "asynchronous" if own_laws else "synchronous"
         return result
 
-    def steps(self, found: Found, *, until: float = 0.0, by_itself: bool = False) -> Steps:
+    def steps(
+        self,
+        found: Found,
+        *,
+        until: float = 0.0,
+        by_itself: bool = False,
+        joined: Sequence[JoinedMovement] = (),
+    ) -> Steps:
         """The steps of the program with these movements, and a wait at its end that lasts until
         `until` s.
-        by_itself: pauses as the controller spends them when nobody asks for a mode.
+        by_itself: pauses as the controller spends them when nobody asks for a mode. joined:
+        movements in place of those of their parts.
         """
-        return self._steps(found, until, self._pause(by_itself), in_full(self._reliance))
+        return self._steps(found, until, self._pause(by_itself), in_full(self._reliance), joined)
 
-    def energies(self, found: Found, *, until: float = 0.0) -> Steps:
+    def energies(
+        self, found: Found, *, until: float = 0.0, joined: Sequence[JoinedMovement] = ()
+    ) -> Steps:
         """The same steps with what they last and cost alone, in a fraction of the time: to
         compare.
         """
-        return self._steps(found, until, self._pause(by_itself=False), energies_only)
+        return self._steps(found, until, self._pause(by_itself=False), energies_only, joined)
 
-    def _steps(self, found: Found, until: float, pause: MakePause, complete: Complete) -> Steps:
+    def _steps(
+        self,
+        found: Found,
+        until: float,
+        pause: MakePause,
+        complete: Complete,
+        joined: Sequence[JoinedMovement],
+    ) -> Steps:
         route = self.movements.route
         charge = Charge(self.request.settings.transitions)
-        legs = legs_of(route, parts_of(self.chain, self.movements), found)
+        legs = legs_of(route, parts_of(self.chain, self.movements), found, joined)
         steps = assembled(
             route.steps, legs, route.scenes, self.request.start, pause, charge, complete
         )

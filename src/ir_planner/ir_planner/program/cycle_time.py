@@ -9,7 +9,7 @@ from ir_kernels import portable
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.program.chain import cheapest_chain
-from ir_planner.program.choice import Choice, Found, Steps
+from ir_planner.program.choice import Choice, Found, JoinedMovement, Steps
 from ir_planner.program.movement_fronts import FASTEST, FrontPoint, SlowDown, TimeValues, slow_downs
 from ir_planner.program.movements import rates_of
 from ir_planner.program.request import Progress, StageError
@@ -181,26 +181,29 @@ _LITTLE = (
 @dataclass(frozen=True, eq=False)
 class TimedChoice:
     """A chain with movements that fill a cycle; bound: the least that movements and wait can take
-    from the mains [J].
+    from the mains [J], with a rest between any two. joined: in place of movements of the chain.
     """
 
     choice: Choice
     timed: Timed
     cycle_time: float
     bound: float = 0.0
+    joined: tuple[JoinedMovement, ...] = ()
 
     @property
     def steps(self) -> Steps:
         """The steps of the program, with the wait that fills its cycle."""
-        return self.choice.steps(self.timed.movements, until=self._until)
+        return self.choice.steps(self.timed.movements, until=self._until, joined=self.joined)
+
+    @property
+    def energies(self) -> Steps:
+        """The same steps with what they last and cost alone."""
+        return self.choice.energies(self.timed.movements, until=self._until, joined=self.joined)
 
     @property
     def energy(self) -> float:
         """Joules of all steps at the mains, carried charge included."""
-        return sum(
-            step.report.energy
-            for step in self.choice.energies(self.timed.movements, until=self._until)
-        )
+        return sum(step.report.energy for step in self.energies)
 
     @property
     def _until(self) -> float:

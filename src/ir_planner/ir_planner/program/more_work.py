@@ -8,12 +8,13 @@ with more work, both in steps of fixed size. What is cheaper is kept: more work 
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ir_planner.errors import RequestError
+from ir_planner.program.blending import Blending, timed_with_blends
 from ir_planner.program.chain import cheapest_chain, layers_of
 from ir_planner.program.choice import Choice, Found, Steps
-from ir_planner.program.cycle_time import cycle_gap, free_gap, timed_choice
+from ir_planner.program.cycle_time import cycle_gap, free_gap
 from ir_planner.program.movement_fronts import FASTEST, Ladder, TimeValues
 from ir_planner.program.movements import Movements, WarmStarts, cost_of, rates_of
 from ir_planner.program.request import ProgramRequest, Progress, StageError
@@ -32,7 +33,9 @@ _HALF = 0.5  # of what is left: for the chain again; the rest is for its movemen
 
 @dataclass(frozen=True, eq=False)
 class ChainAnswer:
-    """A program along a chain. standing: seconds of the pauses in it; gap [%]: as in the answer."""
+    """A program along a chain. standing: seconds of the pauses in it; gap [%]: as in the answer, of
+    the program that stands still between its movements.
+    """
 
     choice: Choice
     steps: Steps
@@ -144,14 +147,34 @@ def planned(choice: Choice, progress: Progress) -> ChainAnswer:
     standing = choice.standing(found)
     steps = choice.steps(found)
     if cycle <= 0.0 or not choice.parts:
-        return ChainAnswer(choice, steps, standing, free_gap(choice, found, steps))
-    timed = timed_choice(choice, cycle, standing, progress)
-    pauses = [step for step in timed.steps if step.is_pause][: sum(step.is_pause for step in steps)]
-    spent = sum(step.report.energy for step in timed.steps) - sum(
+        resting = ChainAnswer(choice, steps, standing, free_gap(choice, found, steps))
+        return _without_rests(resting, found)
+    timed = timed_with_blends(choice, cycle, standing, progress)
+    own = sum(step.is_pause for step in steps)
+    resting_steps = replace(timed, joined=()).energies
+    pauses = [step for step in resting_steps if step.is_pause][:own]
+    spent = sum(step.report.energy for step in resting_steps) - sum(
         pause.report.energy for pause in pauses
     )
     gap = cycle_gap(timed.choice, len(timed.timed.movements), spent, timed.bound)
     return ChainAnswer(choice, timed.steps, standing, gap)
+
+
+def _without_rests(answer: ChainAnswer, found: Found) -> ChainAnswer:
+    """The program with the movements joined where that costs less."""
+    choice = answer.choice
+    blending = Blending(choice)
+    context = choice.movements.context
+    if not blending.places or context.work.exhausted:
+        return answer
+    with context.journal.stage("blending") as notes:
+        joined = blending.joined(found)
+        passing = replace(answer, steps=choice.steps(found, joined=joined)) if joined else answer
+        if passing.cost >= answer.cost:
+            notes.append("nothing is cheaper without standing still")
+            return answer
+        notes.append(blending.said(joined))
+    return passing
 
 
 def _fastest(choice: Choice, found: Found) -> Found:

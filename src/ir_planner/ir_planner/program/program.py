@@ -15,6 +15,7 @@ from ir_msgs_py.search_log import CorrectionLog, SearchLog, WithdrawalLog
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import total_report
 from ir_planner.errors import RequestError
+from ir_planner.program.blending import blended
 from ir_planner.program.chain import TOLERANCE, CostEdges, layers_of
 from ir_planner.program.choice import Choice, Steps
 from ir_planner.program.cycle_time import front_of
@@ -212,7 +213,7 @@ def _answered(
     if request.front_points:
         with context.journal.stage("pareto front"):
             front = front_of(choice, request.front_points, standing, progress)
-        plan = replace(plan, front=tuple(program_of(point.steps) for point in front))
+        plan = replace(plan, front=tuple(program_of(blended(point).steps) for point in front))
     return plan
 
 

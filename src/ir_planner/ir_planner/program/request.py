@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ir_description import Cell, PowerData, ProgramStep
+from ir_description.cell import BLEND_MAX
 from ir_description.cell_review import CellFinding
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
@@ -24,6 +25,8 @@ from ir_values.arrays import FloatArray
 # What a program is asked as, and what its answer is.
 
 FRONT_MAX = 50
+AS_THE_CELL_SAYS = -1.0
+"""Blend of a request that leaves it to the cell."""
 NOT_ASKED = ProgramSavings(sentence="savings were not asked for")
 Progress = Callable[[str, int, int, float], None]  # phase, done, total, cost of the best chain
 
@@ -62,7 +65,8 @@ class ProgramRequest:
     """What to plan: the cell, its stations to visit (empty: its program), from `start` (n,), in
     `cycle_time` s (0: free). savings: hold it against the common program; front_points: programs
     from the shortest cycle time to twice the free one. doors: machines that are not as the cell has
-    them at the start.
+    them at the start. blend [m]: how near stops and ends of lines are passed where nothing happens,
+    below 0: as the cell says.
     """
 
     cell: Cell
@@ -75,10 +79,13 @@ class ProgramRequest:
     savings: bool = False
     front_points: int = 0
     doors: Doors = ()
+    blend: float = AS_THE_CELL_SAYS
 
     def check(self) -> None:
         """Raise RequestError for options that a program doesn't take."""
         bounded(self.front_points, 0, FRONT_MAX, "front_points")
+        if self.blend != AS_THE_CELL_SAYS:
+            bounded(self.blend, 0.0, BLEND_MAX, "blend", "m")
         load = self.options.load
         duration = self.options.duration
         if load not in ("", NO_LOAD):

@@ -11,8 +11,8 @@ from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.savings import ProgramSavings, Saving
 from ir_planner.checks import interval
 from ir_planner.errors import RequestError, TimingError
+from ir_planner.program.blending import timed_with_blends
 from ir_planner.program.choice import Choice, Steps, duration_of
-from ir_planner.program.cycle_time import timed_choice
 from ir_planner.program.movement_fronts import FASTEST
 from ir_planner.program.movements import Failure, Movements, mapped
 from ir_planner.program.request import Progress, StageError
@@ -274,7 +274,7 @@ def held_against_common(
             if context.work.exhausted:
                 notes.append("none")
                 return f"no savings: {_ENDED}"
-            steps = timed_choice(choice, seconds, standing, progress).steps
+            steps = timed_with_blends(choice, seconds, standing, progress).steps
         except (StageError, RequestError) as error:
             notes.append("none")
             return f"no savings: {error}"

@@ -6,7 +6,7 @@ the legs with the best time scaling, straight steps with blended corners, and de
 The cheapest that is certified and passes every place within its tolerance is the answer.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -61,20 +61,34 @@ class Via:
         object.__setattr__(self, "distance", distance)
 
 
-def passed(
-    trajectory: JointTrajectory, places: FloatArray, via: Via, scene: PlanningScene
+@dataclass(frozen=True)
+class Nearness:
+    """How near a place is passed: tolerance [rad] of every joint; with distance [m] above 0 of the
+    tcp's orientation, and that of the tcp.
+    """
+
+    tolerance: float
+    distance: float
+
+
+def passed_within(
+    trajectory: JointTrajectory,
+    places: FloatArray,
+    nearness: Sequence[Nearness],
+    scene: PlanningScene,
 ) -> list[float] | None:
-    """Instants [s] at which the places (V, n) are passed within their tolerance, one after the
+    """Instants [s] at which the places (V, n) are passed, each within its nearness, one after the
     other; None where one isn't.
     """
     count = min(int(np.ceil(trajectory.duration / _STEP)), _INSTANTS) + 1
     times = np.union1d(np.linspace(0.0, trajectory.duration, count), trajectory.times)
     q = trajectory.sample(times).q
-    poses = scene.chain.tcp_poses(q) if via.distance > 0.0 else None
+    by_pose = any(each.distance > 0.0 for each in nearness)
+    poses = scene.chain.tcp_poses(q) if by_pose else None
     instants: list[float] = []
     first = 0
-    for place in places:
-        near = _near(q, poses, place, via, scene)[first:]
+    for place, within in zip(places, nearness, strict=True):
+        near = _near(q, poses, place, within, scene)[first:]
         if not near.any():
             return None
         first += int(np.argmax(near))
@@ -83,18 +97,22 @@ def passed(
 
 
 def _near(
-    q: FloatArray, poses: FloatArray | None, place: FloatArray, via: Via, scene: PlanningScene
+    q: FloatArray,
+    poses: FloatArray | None,
+    place: FloatArray,
+    within: Nearness,
+    scene: PlanningScene,
 ) -> FloatArray:
-    """Which of states (N, n) are within the tolerance of a place (n,)."""
-    if poses is None:
-        return np.asarray(np.abs(q - place).max(axis=1) <= via.tolerance)
+    """Which of states (N, n) are near enough to a place (n,)."""
+    if poses is None or within.distance <= 0.0:
+        return np.asarray(np.abs(q - place).max(axis=1) <= within.tolerance)
     wanted = scene.chain.tcp_poses(place[None])[0]
     apart = poses[:, :3, 3] - wanted[:3, 3]
     away = np.sqrt((apart * apart).sum(axis=1))
     turn = poses[:, :3, :3] - wanted[:3, :3]
     chord = np.sqrt((turn * turn).sum(axis=(1, 2)))  # 2 sqrt(2) sin(angle / 2)
-    most = np.sqrt(8.0) * portable.sin(0.5 * via.tolerance)
-    return np.asarray((away <= via.distance) & (chord <= most))
+    most = np.sqrt(8.0) * portable.sin(0.5 * within.tolerance)
+    return np.asarray((away <= within.distance) & (chord <= most))
 
 
 class ViaSearch:
@@ -152,7 +170,7 @@ class ViaSearch:
         answer = self._best(stopping, best)
         if answer is None:
             raise self._too_short(stopping)
-        times = passed(answer.trajectory, chosen[1:-1], self.via, self.context.scene)
+        times = self._instants(answer, chosen)
         assert times is not None  # of all that serve
         text = ", ".join(f"{t:.3f} s" for t in times)
         stops = "" if answer is best else ", with a stop at each"
@@ -324,6 +342,12 @@ class ViaSearch:
         indices[-1] = len(flat) - 1
         return np.asarray(flat[indices])
 
+    def _instants(self, movement: Movement, chain: FloatArray) -> list[float] | None:
+        """When a movement passes the places; None where it misses one."""
+        places = chain[1:-1]
+        near = [Nearness(self.via.tolerance, self.via.distance)] * len(places)
+        return passed_within(movement.trajectory, places, near, self.context.scene)
+
     def _serves(self, movement: Movement, chain: FloatArray) -> bool:
         """Whether a movement is certified, passes all places, and is as long as requested."""
         requested = self.context.options.duration
@@ -333,7 +357,7 @@ class ViaSearch:
         if violation is not None:
             self.context.journal.reject(f"without stops: {violation.what}")
             return False
-        if passed(movement.trajectory, chain[1:-1], self.via, self.context.scene) is None:
+        if self._instants(movement, chain) is None:
             self.context.journal.reject("without stops: a place is missed")
             return False
         return True
