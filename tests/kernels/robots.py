@@ -62,6 +62,7 @@ class RobotLiteral:
     self_pairs: tuple[tuple[str, str], ...] = ()
     load_self_capsules: tuple[str, ...] = field(default=())
     motor_turns: Any = None
+    first_slides: bool = False
 
     def __post_init__(self) -> None:
         if self.motor_turns is None:
@@ -191,6 +192,58 @@ def random_chain(rng: np.random.Generator, n: int) -> RobotLiteral:
         copper_loss=np.full(n, 0.5),
         envelope_speed=np.tile([1.0, 2.0], (n, 1)),
         envelope_torque=np.tile([1000.0, 900.0, 500.0], (n, 1)),
+    )
+
+
+def on_a_rail(robot: RobotLiteral, pose: FloatArray, along: FloatArray) -> RobotLiteral:
+    """The robot on a carriage of 300 kg that slides along a direction (3,) of the rail's frame,
+    whose pose (4, 4) is given in link 0; its own base stands on the carriage, turned.
+    """
+    cross = np.array(
+        [[0.0, 0.0, 1.0, 0.1], [1.0, 0.0, 0.0, -0.2], [0.0, 1.0, 0.0, 0.3], [0, 0, 0, 1.0]]
+    )
+    balance = robot.counterbalance
+    n = len(robot.link_mass)
+    turns = np.eye(n)
+    turns[1:, 1:] = robot.motor_turns
+
+    def before(value: float, values: FloatArray) -> FloatArray:
+        return np.concatenate([np.full((1, *values.shape[1:]), value), values])
+
+    return replace(
+        robot,
+        name=f"{robot.name} on a rail",
+        joint_names=("E1", *robot.joint_names),
+        link_names=("rail", *robot.link_names),
+        joint_origin=np.concatenate(
+            [pose[None], cross @ robot.joint_origin[:1], robot.joint_origin[1:]]
+        ),
+        joint_axis=np.concatenate([along[None], robot.joint_axis]),
+        position_min=before(-3.0, robot.position_min),
+        position_max=before(3.0, robot.position_max),
+        velocity_max=before(1.9, robot.velocity_max),
+        acceleration_max=before(2.0, robot.acceleration_max),
+        jerk_max=before(20.0, robot.jerk_max),
+        link_mass=np.concatenate([[50.0, 300.0 + robot.link_mass[0]], robot.link_mass[1:]]),
+        link_com=np.concatenate([np.zeros((2, 3)), robot.link_com[1:]]),
+        link_inertia=np.concatenate([np.eye(3)[None], robot.link_inertia]),
+        gear_ratio=before(150.0, robot.gear_ratio),
+        reflected_inertia=before(120.0, robot.reflected_inertia),
+        friction_viscous=before(400.0, robot.friction_viscous),
+        friction_coulomb=before(600.0, robot.friction_coulomb),
+        copper_loss=before(0.6, robot.copper_loss),
+        envelope_speed=np.concatenate(
+            [np.linspace(0.8, 1.9, robot.envelope_speed.shape[1])[None], robot.envelope_speed]
+        ),
+        envelope_torque=np.concatenate(
+            [
+                np.linspace(9000.0, 5000.0, robot.envelope_torque.shape[1])[None],
+                robot.envelope_torque,
+            ]
+        ),
+        counterbalance=None if balance is None else replace(balance, joint=balance.joint + 1),
+        motor_turns=turns,
+        first_slides=True,
     )
 
 

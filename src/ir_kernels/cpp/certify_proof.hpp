@@ -79,12 +79,17 @@ template <class V> struct Proof {
       const Vec<V> start = s.start(c), end = s.end(c);
       V m{};
       to[link] = m;
-      for (int j = link - 1; j >= 0; --j) {
+      const int turning = model.chain.first_slides ? 1 : 0;
+      for (int j = link - 1; j >= turning; --j) {
         const Vec<V>&origin = s.origin[j + 1], &axis = s.axis[j + 1];
         const Vec<V> a = cross(start - origin, axis), b = cross(end - origin, axis);
         const V reach = sqrt(max(dot(a, a), dot(b, b)));
         m = m + spread[j] * (reach + m + margin);
         to[j] = m;
+      }
+      if (turning == 1 && link > 0) {  // a rail moves every point by as much as itself
+        m = m + spread[0] * (S(1) + margin);
+        to[0] = m;
       }
       far[c / 16][c % 16] = static_cast<float>(highest<V>(m)) * 1.00001f + static_cast<float>(margin + shift.highest);
     }

@@ -44,8 +44,8 @@ void frame_about(const double axis[3], const double next[3], double r[9]) {
 
 }  // namespace
 
-Chain::Chain(int count, const double* joint_origin, const double* joint_axis, const double* base_pose)
-    : n(count), joints(count), internal(9 * (count + 1)) {
+Chain::Chain(int count, const double* joint_origin, const double* joint_axis, const double* base_pose, bool slides)
+    : n(count), first_slides(slides), joints(count), internal(9 * (count + 1)) {
   // the joints' rotations at q = 0, their origins, and their axes, each in the frame of the link before
   std::vector<double> turn(9 * n), shift(3 * n), axis(3 * (n + 1), 0.0);
   for (int k = 0; k < n; ++k) {
@@ -98,6 +98,7 @@ void Chain::forward(const Double8* q, Frame<Double8>* frames) const {
     if (k % most_at_once == 0) {
       const int ahead = std::min(n - k, most_at_once);
       for (int j = 0; j < ahead; ++j) angles[j] = q[k + j] + joints[k + j].offset;
+      if (k == 0 && first_slides) angles[0] = splat<Double8>(joints[0].offset);
       sincos(ahead, angles, sines, cosines);
     }
     const Double8 s = sines[k % most_at_once], c = cosines[k % most_at_once];
@@ -107,6 +108,7 @@ void Chain::forward(const Double8* q, Frame<Double8>* frames) const {
     f.y = c * y - s * f.x;
     f.x = c * f.x + s * y;
     f.z = axis;
+    if (k == 0 && first_slides) f.origin = f.origin + q[0] * axis;
     frames[k + 1] = f;
   }
 }

@@ -1,4 +1,5 @@
-// A serial chain of revolute joints, forward kinematics for eight configurations at a time.
+// A serial chain of revolute joints, the first of which may slide instead (a rail under the arm); forward kinematics for
+// eight configurations at a time.
 //
 // Every link carries an internal frame (chosen once, at construction): z is its joint's axis, x the common normal of
 // that and the next one, as Denavit and Hartenberg have it. World coordinates are taken relative to the base's origin.
@@ -71,13 +72,14 @@ struct Joint {
 
 struct Chain {
   int n = 0;
+  bool first_slides = false;  // joint 1 moves along its axis by q[0] [m]
   double base_origin[3];
   Frame<Double8> base;
   std::vector<Joint> joints;
   std::vector<double> internal;  // (n + 1) x 9: internal frame in the link's own frame, row major
 
   // joint_origin (n, 4, 4), joint_axis (n, 3), base_pose (4, 4), all row major
-  Chain(int joints, const double* joint_origin, const double* joint_axis, const double* base_pose);
+  Chain(int joints, const double* joint_origin, const double* joint_axis, const double* base_pose, bool first_slides);
 
   // a point of a link's own frame in its internal frame
   void to_internal(int link, const double point[3], double result[3]) const;

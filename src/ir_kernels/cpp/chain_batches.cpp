@@ -54,8 +54,10 @@ void jacobians(const Chain& chain, const double* tcp, const double* q, std::size
     chain.forward(lanes.data(), frames.data());
     const auto at = place(frames[chain.n], point);
     for (int j = 0; j < chain.n; ++j) {
-      const auto& axis = frames[j + 1].z;
-      const auto linear = cross(axis, at - frames[j + 1].origin);
+      const bool slides = j == 0 && chain.first_slides;
+      const auto& along = frames[j + 1].z;
+      const auto linear = slides ? along : cross(along, at - frames[j + 1].origin);
+      const auto axis = slides ? Vec<Double8>{} : along;
       for (int k = 0; k < used; ++k) {
         double* column = result + (first + k) * 6 * chain.n + j;
         const double values[6] = {linear.x[k], linear.y[k], linear.z[k], axis.x[k], axis.y[k], axis.z[k]};

@@ -23,6 +23,8 @@ core::ChainInput input_of(const py::object& data) {
   if (in.n < 1 || in.n > core::kMaxJoints)
     throw std::invalid_argument("robot has " + std::to_string(in.n) + " joints: the compiled core takes 1 to " +
                                 std::to_string(core::kMaxJoints));
+  in.first_slides = data.attr("first_slides").cast<bool>();
+  if (in.first_slides && in.n < 2) throw std::invalid_argument("a rail has nothing on it");
   in.origin = flat(data, "origin");
   in.axis = flat(data, "axis");
   in.mass = flat(data, "mass");

@@ -40,20 +40,26 @@ inline void add_scaled(Vector<S>& to, const Vector<S>& v, const S& k) {
   to = {to.x + v.x * k, to.y + v.y * k, to.z + v.z * k};
 }
 
-// Adds to by_q, by_qd, by_qdd the derivatives of sum_i u_i tau_i, tau from newton_euler on the same numbers (with
-// gravity) traced in `link`; sn, cs of q + theta0.
-template <int kJoints = 0, class S, class T>
+// Of arm_newton_euler. kMoves: of_base is the adjoint of the force on the base, and becomes that of its acceleration.
+template <int kJoints, bool kMoves, class S, class T>
 // long: the recursion backwards, step by step
-inline void newton_euler_adjoint(const Model<T>& m, const S* sn, const S* cs, const S* qd, const LinkTrace<S>* link,
-                                 const S* u, S* by_q, S* by_qd, S* by_qdd) {
-  const int n = kJoints ? kJoints : m.n;  // a number known at compile time unrolls the loops
+inline void arm_newton_euler_adjoint(const Joint<T>* joint, int count, const S* sn, const S* cs, const S* qd,
+                                     const LinkTrace<S>* link, const S* u, S* by_q, S* by_qd, S* by_qdd,
+                                     Vector<S>* of_base) {
+  const int n = kJoints ? kJoints : count;  // a number known at compile time unrolls the loops
   constexpr int kMost = kJoints ? kJoints : kMaxJoints;
   const S zero = u[0] * T(0);
   Vector<S> of_force[kMost], of_moment[kMost];
   of_force[0] = {zero, zero, zero};
   of_moment[0] = {zero, zero, u[0]};
+  if constexpr (kMoves) {
+    const Vector<S>& F = link[0].force;
+    const Vector<S> f = into_link(joint[0], sn[0], cs[0], *of_base);
+    by_q[0] = by_q[0] + (f.y * F.x - f.x * F.y);
+    of_force[0] = f;
+  }
   for (int i = 1; i < n; ++i) {
-    const Joint<T>& j = m.joint[i];
+    const Joint<T>& j = joint[i];
     const Vector<S>& before = of_moment[i - 1];
     Vector<S> f = of_force[i - 1];  // moment + r x force: the force's adjoint is moment's x r
     f = {f.x + before.y * j.r[2] - before.z * j.r[1], f.y + before.z * j.r[0] - before.x * j.r[2],
@@ -67,7 +73,7 @@ inline void newton_euler_adjoint(const Model<T>& m, const S* sn, const S* cs, co
   }
   Vector<S> of_w{zero, zero, zero}, of_dw = of_w, of_next = of_w;  // of the motion of the link after this one's frame
   for (int i = n - 1; i >= 0; --i) {
-    const Joint<T>& j = m.joint[i];
+    const Joint<T>& j = joint[i];
     const Vector<S>&w = link[i].w, &dw = link[i].dw, &a = link[i].a, &f = of_force[i], &t = of_moment[i];
     Vector<S> of_a = of_next;
     // K applied to r (next origin) and h (first moment): K v = dw x v + w (w . v) - |w|^2 v
@@ -77,7 +83,7 @@ inline void newton_euler_adjoint(const Model<T>& m, const S* sn, const S* cs, co
               of_w.z + y.z * wv + yw * vz - (yv * w.z) * T(2)};
       of_dw = {of_dw.x + y.z * vy - y.y * vz, of_dw.y + y.x * vz - y.z * vx, of_dw.z + y.y * vx - y.x * vy};
     };
-    if (i + 1 < n && m.joint[i + 1].has_r) field(of_next, m.joint[i + 1].r[0], m.joint[i + 1].r[1], m.joint[i + 1].r[2]);
+    if (i + 1 < n && joint[i + 1].has_r) field(of_next, joint[i + 1].r[0], joint[i + 1].r[1], joint[i + 1].r[2]);
     if (j.has_hx || j.has_hy) {
       field(f, j.hx, j.hy, T(0));
       of_a = {of_a.x - t.z * j.hy, of_a.y + t.z * j.hx, of_a.z + t.x * j.hy - t.y * j.hx};  // t . (h x a)
@@ -91,6 +97,7 @@ inline void newton_euler_adjoint(const Model<T>& m, const S* sn, const S* cs, co
     by_qd[i] = by_qd[i] + of_w.z;
     if (i == 0) {
       by_q[0] = by_q[0] + (of_a.x * a.y - of_a.y * a.x);
+      if constexpr (kMoves) *of_base = out_of_link(j, sn[0], cs[0], of_a);
       break;
     }
     // the motion before the joint's own was added, in this link's frame
@@ -103,6 +110,22 @@ inline void newton_euler_adjoint(const Model<T>& m, const S* sn, const S* cs, co
     of_w = out_of_link(j, sn[i], cs[i], of_w);
     of_dw = out_of_link(j, sn[i], cs[i], of_dw);
     of_next = out_of_link(j, sn[i], cs[i], of_a);
+  }
+}
+
+// Adds to by_q, by_qd, by_qdd the derivatives of sum_i u_i tau_i, tau from newton_euler on the same numbers (with
+// gravity) traced in `link`; sn, cs of q + theta0. kJoints and kRail as there.
+template <int kJoints = 0, bool kRail = false, class S, class T>
+inline void newton_euler_adjoint(const Model<T>& m, const S* sn, const S* cs, const S* qd, const LinkTrace<S>* link,
+                                 const S* u, S* by_q, S* by_qd, S* by_qdd) {
+  if (kRail || (kJoints == 0 && m.rail.there)) {
+    const T* along = m.rail.along;
+    Vector<S> of_base{u[0] * along[0], u[0] * along[1], u[0] * along[2]};
+    arm_newton_euler_adjoint<kJoints, true>(m.joint + 1, m.n - 1, sn + 1, cs + 1, qd + 1, link, u + 1, by_q + 1, by_qd + 1,
+                                            by_qdd + 1, &of_base);
+    by_qdd[0] = by_qdd[0] + (of_base.x * along[0] + of_base.y * along[1] + of_base.z * along[2]) + u[0] * m.rail.mass;
+  } else {
+    arm_newton_euler_adjoint<kJoints, false, S>(m.joint, m.n, sn, cs, qd, link, u, by_q, by_qd, by_qdd, nullptr);
   }
 }
 

@@ -32,11 +32,11 @@ inline Composite out_of_link(const Joint<double>& j, Doubles s, Doubles c, const
   return a;
 }
 
-// H as columns H[i * n + k]
+// H as columns H[i * n + k]; of a rail: mass and first moments.
 inline void composite_bodies(const Model<double>& m, const Doubles* s, const Doubles* c, Doubles* H) {
-  const int n = m.n;
+  const int n = m.n, first = m.rail.there ? 1 : 0;
   Composite body{};
-  for (int i = n - 1; i >= 0; --i) {
+  for (int i = n - 1; i >= first; --i) {
     const Joint<double>& j = m.joint[i];
     Composite own{{splat<Doubles>(j.hx), splat<Doubles>(j.hy), Doubles{}}, splat<Doubles>(j.xx), splat<Doubles>(j.xy), splat<Doubles>(j.xz),
                   Doubles{},        splat<Doubles>(j.yz), splat<Doubles>(j.zz)};
@@ -48,12 +48,17 @@ inline void composite_bodies(const Model<double>& m, const Doubles* s, const Dou
     body = own;
     H[i * n + i] = body.zz;
     Vector<Doubles> force{-body.h.y, body.h.x, Doubles{}}, moment{body.xz, body.yz, body.zz};
-    for (int k = i; k > 0; --k) {
+    for (int k = i; k > first; --k) {
       force = out_of_link(m.joint[k], s[k], c[k], force);
       moment = add_moment(m.joint[k], out_of_link(m.joint[k], s[k], c[k], moment), force);
       H[i * n + k - 1] = H[(k - 1) * n + i] = moment.z;
     }
+    if (m.rail.there) {
+      force = out_of_link(m.joint[1], s[1], c[1], force);
+      H[i * n] = H[i] = m.rail.along[0] * force.x + m.rail.along[1] * force.y + m.rail.along[2] * force.z;
+    }
   }
+  if (m.rail.there) H[0] = splat<Doubles>(m.rail.mass);
 }
 
 // Solves the symmetric positive definite A x = b in place (L D L'); A is destroyed.

@@ -201,9 +201,66 @@ Balance<double> balance_of(const ChainInput& in, const Joint<double>* joints) {
   return b;
 }
 
-}  // namespace
+// What stands on the rail, as if the rail weren't there.
+ChainInput on_the_rail(const ChainInput& in) {
+  ChainInput arm = in;
+  arm.first_slides = false;
+  --arm.n;
+  const auto drop = [](std::vector<double>& values, int count) { values.erase(values.begin(), values.begin() + count); };
+  for (std::vector<double>* one : {&arm.mass, &arm.rotor, &arm.viscous, &arm.coulomb, &arm.ratio, &arm.copper}) drop(*one, 1);
+  drop(arm.origin, 16);
+  drop(arm.axis, 3);
+  drop(arm.com, 3);
+  drop(arm.inertia, 9);
+  drop(arm.envelope_speed, in.knots);
+  drop(arm.envelope_torque, in.knots + 1);
+  for (int i = 0; i < 3; ++i)  // the first joint seen from the base
+    for (int j = 0; j < 4; ++j) {
+      double sum = j == 3 ? in.origin[4 * i + 3] : 0.0;
+      for (int k = 0; k < 3; ++k) sum += in.origin[4 * i + k] * in.origin[16 + 4 * k + j];
+      arm.origin[4 * i + j] = sum;
+    }
+  if (arm.balanced_joint >= 0) --arm.balanced_joint;
+  for (std::vector<double>* matrix : {&arm.turns, &arm.inverse}) {
+    std::vector<double> inner;
+    for (int i = 1; i < in.n; ++i)
+      for (int j = 1; j < in.n; ++j) inner.push_back((*matrix)[i * in.n + j]);
+    *matrix = inner;
+  }
+  return arm;
+}
 
-Model<double> build_model(const ChainInput& in) {  // long: one block per part of the model, each with its checks
+Model<double> arm_model(const ChainInput& in, const Vec3* along);
+
+// The arm's model moved by one joint, with the rail before it.
+Model<double> model_with_rail(const ChainInput& in) {
+  Vec3 along{};
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 3; ++k) along[i] += in.origin[4 * i + k] * in.axis[k];
+  const Model<double> arm = arm_model(on_the_rail(in), &along);
+  Model<double> model = arm;
+  model.n = in.n;
+  model.rail.mass = 0.0;
+  for (double mass : in.mass) model.rail.mass += mass;
+  model.joint[0] = Joint<double>{};
+  model.joint[0].turn = Joint<double>::kParallel;
+  model.joint[0].cos_alpha = 1.0;
+  for (int i = 1; i < in.n; ++i) {
+    model.joint[i] = arm.joint[i - 1];
+    model.drive[i] = arm.drive[i - 1];
+  }
+  model.drive[0] = {in.rotor[0], in.viscous[0], in.coulomb[0], in.ratio[0], in.copper[0] / (in.ratio[0] * in.ratio[0])};
+  if (arm.balance.joint >= 0) ++model.balance.joint;
+  for (int i = 0; i < in.n; ++i)
+    for (int j = 0; j < in.n; ++j) {
+      model.coupling.turns[i][j] = in.turns[i * in.n + j];
+      model.coupling.inverse[i][j] = in.inverse[i * in.n + j];
+    }
+  return model;
+}
+
+// along: of a rail under the arm, in the frame of link 0
+Model<double> arm_model(const ChainInput& in, const Vec3* along) {  // long: one block per part of the model, with its checks
   Model<double> model;
   model.n = in.n;
   const Lines lines = joint_lines(in);
@@ -259,6 +316,11 @@ Model<double> build_model(const ChainInput& in) {  // long: one block per part o
   }
   const Vec3 lift = transpose(frames[0].axes()) * (-1.0 * in.gravity);
   for (int k = 0; k < 3; ++k) model.lift[k] = lift[k];
+  if (along != nullptr) {
+    const Vec3 direction = transpose(frames[0].axes()) * *along;
+    model.rail.there = true;
+    for (int k = 0; k < 3; ++k) model.rail.along[k] = tidy(direction[k]);
+  }
   model.balance = balance_of(in, model.joint);
   for (int i = 0; i < in.n; ++i)
     for (int j = 0; j < in.n; ++j) {
@@ -268,6 +330,12 @@ Model<double> build_model(const ChainInput& in) {  // long: one block per part o
       model.coupling.any |= turns != (i == j ? 1.0 : 0.0);
     }
   return model;
+}
+
+}  // namespace
+
+Model<double> build_model(const ChainInput& in) {
+  return in.first_slides ? model_with_rail(in) : arm_model(in, nullptr);
 }
 
 Model<float> to_single(const Model<double>& m) {
@@ -290,6 +358,7 @@ Model<float> to_single(const Model<double>& m) {
   s.balance.square_sin = f(b.square_sin);
   for (int k = 0; k < Balance<double>::kTerms; ++k) s.balance.coefficient[k] = f(b.coefficient[k]);
   for (int k = 0; k < 3; ++k) s.lift[k] = f(m.lift[k]);
+  s.rail = {m.rail.there, {f(m.rail.along[0]), f(m.rail.along[1]), f(m.rail.along[2])}, f(m.rail.mass)};
   s.coupling.any = m.coupling.any;
   for (int i = 0; i < m.n; ++i)
     for (int j = 0; j < m.n; ++j) {

@@ -15,6 +15,7 @@ using Mat3 = std::array<Vec3, 3>;
 // What the model is built from: see ir_kernels/dynamics_data.py.
 struct ChainInput {
   int n = 0;
+  bool first_slides = false;  // joint 0 is a rail under the arm
   std::vector<double> origin, axis, mass, com, inertia;
   Vec3 gravity{};
   std::vector<double> rotor, viscous, coulomb, ratio, copper, envelope_speed, envelope_torque;
@@ -84,14 +85,24 @@ inline void multiply(int n, const T (&matrix)[kMaxJoints][kMaxJoints], S* x) {
   for (int i = 0; i < n; ++i) x[i] = product[i];
 }
 
+// A rail under the arm: joint 0 slides along a direction of frame 0 of the arm and moves all of the mass. What the arm on it
+// needs doesn't depend on where it stands: the recursions are those of joints 1..n-1, whose base accelerates.
+template <class T>
+struct Rail {
+  bool there = false;
+  T along[3] = {};
+  T mass = 0;
+};
+
 template <class T>
 struct Model {
   int n = 0;
+  Rail<T> rail;
   Joint<T> joint[kMaxJoints];
   Drive<T> drive[kMaxJoints];
   Balance<T> balance;
   Coupling<T> coupling;
-  T lift[3];  // minus the acceleration of free fall, in frame 0
+  T lift[3];  // minus the acceleration of free fall, in frame 0 of the arm
 };
 
 Model<double> build_model(const ChainInput& input);

@@ -95,29 +95,28 @@ struct NoTrace {
   template <class S> void load(int, const Vector<S>&, const Vector<S>&) {}
 };
 
-// H qdd + h: sin and cos of q + theta0, torque per joint. Without `gravity` the weight is left out. `trace` receives the
-// motion of each link (angular velocity and acceleration, acceleration of its origin) and the load that it hands on.
-template <int kJoints = 0, class S, class T, class Trace = NoTrace>
+// An arm of joints 0..count-1 whose base accelerates by `base` in frame 0, what holds its weight included. kMoves: `push`
+// gets the force that it hands on to its base, but for mass times acceleration. `trace` receives the motion of each link
+// (angular velocity and acceleration, acceleration of its origin) and the load that it hands on.
+template <int kJoints, bool kMoves, class S, class T, class Trace>
 // long: unrolled out and back, so that what a link hands on stays in registers
-inline void newton_euler(const Model<T>& m, const S* sn, const S* cs, const S* qd, const S* qdd, S* tau,
-                         bool gravity = true, Trace&& trace = {}) {
-  const int n = kJoints ? kJoints : m.n;  // a number known at compile time unrolls the loops
+inline void arm_newton_euler(const Joint<T>* joint, int count, const Vector<S>& base, const S* sn, const S* cs,
+                             const S* qd, const S* qdd, S* tau, Vector<S>* push, Trace&& trace) {
+  const int n = kJoints ? kJoints : count;  // a number known at compile time unrolls the loops
   constexpr int kMost = kJoints ? kJoints : kMaxJoints;
   Vector<S> force[kMost], moment[kMost];
   const S zero = qd[0] * T(0);
   Vector<S> w{zero, zero, qd[0]}, dw{zero, zero, qdd[0]};
-  const T on = gravity ? T(1) : T(0);
-  Vector<S> a = into_link(m.joint[0], sn[0], cs[0],
-                          {zero + m.lift[0] * on, zero + m.lift[1] * on, zero + m.lift[2] * on});
+  Vector<S> a = into_link(joint[0], sn[0], cs[0], base);
   trace.motion(0, w, dw, a);
-  const Joint<T>& first = m.joint[0];
+  const Joint<T>& first = joint[0];
   const S square = qd[0] * qd[0];
   force[0] = {square * -first.hx - qdd[0] * first.hy, qdd[0] * first.hx - square * first.hy, zero};
   moment[0] = {zero, zero, qdd[0] * first.zz + a.y * first.hx - a.x * first.hy};
-  if (n > 1) a = move_field(m.joint[1], square, qdd[0], a);
+  if (n > 1) a = move_field(joint[1], square, qdd[0], a);
 #pragma GCC unroll 8
   for (int i = 1; i < n; ++i) {
-    const Joint<T>& j = m.joint[i];
+    const Joint<T>& j = joint[i];
     const Vector<S> w_before = into_link(j, sn[i], cs[i], w);
     const Vector<S> dw_before = into_link(j, sn[i], cs[i], dw);
     a = into_link(j, sn[i], cs[i], a);
@@ -139,7 +138,7 @@ inline void newton_euler(const Model<T>& m, const S* sn, const S* cs, const S* q
     const bool last = i + 1 == n;
     if (!j.has_hx && !j.has_hy) {
       f = {zero, zero, zero};
-      if (last || !m.joint[i + 1].has_r) continue;
+      if (last || !joint[i + 1].has_r) continue;
     }
     const Field<S> K(w, dw);
     if (j.has_hx) {
@@ -155,7 +154,7 @@ inline void newton_euler(const Model<T>& m, const S* sn, const S* cs, const S* q
       t.z = t.z - a.x * j.hy;
     }
     if (!last) {  // to the origin of the next frame
-      const Joint<T>& next = m.joint[i + 1];
+      const Joint<T>& next = joint[i + 1];
       if (next.has[0]) a = a + Vector<S>{K.xx * next.r[0], K.yx * next.r[0], K.zx * next.r[0]};
       if (next.has[1]) a = a + Vector<S>{K.xy * next.r[1], K.yy * next.r[1], K.zy * next.r[1]};
       if (next.has[2]) a = a + Vector<S>{K.xz * next.r[2], K.yz * next.r[2], K.zz * next.r[2]};
@@ -163,19 +162,47 @@ inline void newton_euler(const Model<T>& m, const S* sn, const S* cs, const S* q
   }
 #pragma GCC unroll 8
   for (int i = n - 1; i > 0; --i) {
-    const Joint<T>& j = m.joint[i];
+    const Joint<T>& j = joint[i];
     tau[i] = moment[i].z;
     trace.load(i, force[i], moment[i]);
     const Vector<S> f = out_of_link(j, sn[i], cs[i], force[i]);
     const Vector<S> t = add_moment(j, out_of_link(j, sn[i], cs[i], moment[i]), f);
     if (i == 1) {
       moment[0].z = moment[0].z + t.z;
+      if constexpr (kMoves) force[0] = force[0] + f;
     } else {
       force[i - 1] = force[i - 1] + f;
       moment[i - 1] = moment[i - 1] + t;
     }
   }
   tau[0] = moment[0].z;
+  if constexpr (kMoves) {
+    trace.load(0, force[0], moment[0]);
+    *push = out_of_link(joint[0], sn[0], cs[0], force[0]);
+  }
+}
+
+// H qdd + h: sin and cos of q + theta0, torque per joint, force of a rail. Without `gravity` the weight is left out.
+// kJoints: of the arm, known at compile time, with a rail under it if kRail; 0: whatever the model has. What is traced are
+// the links of the arm, from 0 on.
+template <int kJoints = 0, bool kRail = false, class S, class T, class Trace = NoTrace>
+inline void newton_euler(const Model<T>& m, const S* sn, const S* cs, const S* qd, const S* qdd, S* tau,
+                         bool gravity = true, Trace&& trace = {}) {
+  const T on = gravity ? T(1) : T(0);
+  if (kRail || (kJoints == 0 && m.rail.there)) {
+    const T* along = m.rail.along;
+    const S zero = qd[1] * T(0);
+    const Vector<S> lift{zero + m.lift[0] * on, zero + m.lift[1] * on, zero + m.lift[2] * on};
+    const Vector<S> base{lift.x + qdd[0] * along[0], lift.y + qdd[0] * along[1], lift.z + qdd[0] * along[2]};
+    Vector<S> push;
+    arm_newton_euler<kJoints, true>(m.joint + 1, m.n - 1, base, sn + 1, cs + 1, qd + 1, qdd + 1, tau + 1, &push, trace);
+    const S weight = lift.x * along[0] + lift.y * along[1] + lift.z * along[2];
+    tau[0] = push.x * along[0] + push.y * along[1] + push.z * along[2] + (qdd[0] + weight) * m.rail.mass;
+  } else {
+    const S zero = qd[0] * T(0);
+    const Vector<S> lift{zero + m.lift[0] * on, zero + m.lift[1] * on, zero + m.lift[2] * on};
+    arm_newton_euler<kJoints, false, S>(m.joint, m.n, lift, sn, cs, qd, qdd, tau, nullptr, trace);
+  }
 }
 
 // What the counterbalance does about +axis, from sin and cos of q + theta0 of its joint.

@@ -22,8 +22,8 @@ void expect_threshold(const ir::Model& model, const Array& threshold) {
   expect(threshold.size() == model.pairs(), "threshold has to be (Z,)");
 }
 
-Array link_poses(const Array& origin, const Array& axis, const Array& base, const Array& q) {
-  const ir::Chain chain = ir::chain_of(origin, axis, base);
+Array link_poses(const Array& origin, const Array& axis, const Array& base, const Array& q, bool first_slides) {
+  const ir::Chain chain = ir::chain_of(origin, axis, base, first_slides);
   const std::size_t count = rows_of(q, chain.n);
   Array result = empty({py::ssize_t(count), chain.n + 1, 4, 4});
   double* to = result.mutable_data();
@@ -32,8 +32,9 @@ Array link_poses(const Array& origin, const Array& axis, const Array& base, cons
   return result;
 }
 
-Array jacobian(const Array& origin, const Array& axis, const Array& base, const Array& tcp, const Array& q) {
-  const ir::Chain chain = ir::chain_of(origin, axis, base);
+Array jacobian(const Array& origin, const Array& axis, const Array& base, const Array& tcp, const Array& q,
+               bool first_slides) {
+  const ir::Chain chain = ir::chain_of(origin, axis, base, first_slides);
   const std::size_t count = rows_of(q, chain.n);
   expect(tcp.size() == 16, "tcp has to be (4, 4)");
   Array result = empty({py::ssize_t(count), 6, chain.n});

@@ -105,16 +105,16 @@ std::vector<std::array<int, 2>> pairs_of(const Indices& pairs, pybind11::ssize_t
 
 }  // namespace
 
-Chain chain_of(const Array& joint_origin, const Array& joint_axis, const Array& base_pose) {
+Chain chain_of(const Array& joint_origin, const Array& joint_axis, const Array& base_pose, bool first_slides) {
   const int n = static_cast<int>(joint_axis.shape(0));
   expect(joint_axis.size() == 3 * n && joint_origin.size() == 16 * n && base_pose.size() == 16, "not a chain");
-  return Chain(n, joint_origin.data(), joint_axis.data(), base_pose.data());
+  return Chain(n, joint_origin.data(), joint_axis.data(), base_pose.data(), first_slides);
 }
 
-Model model_of(const Array& joint_origin, const Array& joint_axis, const Array& base_pose, const Indices& link,
-               const Array& ends, const Array& radius, const Indices& kind, const Array& pose, const Array& size,
+Model model_of(const Array& joint_origin, const Array& joint_axis, const Array& base_pose, bool first_slides,
+               const Indices& link, const Array& ends, const Array& radius, const Indices& kind, const Array& pose, const Array& size,
                const std::vector<std::array<Array, 4>>& hulls, const Indices& environment, const Indices& self_pairs) {
-  Model m(chain_of(joint_origin, joint_axis, base_pose));
+  Model m(chain_of(joint_origin, joint_axis, base_pose, first_slides));
   const pybind11::ssize_t capsules = link.size(), bodies = kind.size();
   expect(ends.size() == 6 * capsules && radius.size() == capsules, "capsules don't fit together");
   expect(pose.size() == 16 * bodies && size.size() == 3 * bodies && pybind11::ssize_t(hulls.size()) == bodies,

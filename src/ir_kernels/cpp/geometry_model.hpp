@@ -9,13 +9,13 @@
 
 namespace ir {
 
-// joint_origin (n, 4, 4), joint_axis (n, 3), base_pose (4, 4).
-Chain chain_of(const Array& joint_origin, const Array& joint_axis, const Array& base_pose);
+// joint_origin (n, 4, 4), joint_axis (n, 3), base_pose (4, 4); first_slides: joint 1 is a rail.
+Chain chain_of(const Array& joint_origin, const Array& joint_axis, const Array& base_pose, bool first_slides);
 
 // Capsules: link (C,), ends (C, 2, 3), radius (C,). Bodies: kind (B,), pose (B, 4, 4), size (B, 3), hulls: vertices,
 // edges, normals, offsets of each. Pairs (Z, 2): capsule and body, capsule and capsule.
-Model model_of(const Array& joint_origin, const Array& joint_axis, const Array& base_pose, const Indices& link,
-               const Array& ends, const Array& radius, const Indices& kind, const Array& pose, const Array& size,
+Model model_of(const Array& joint_origin, const Array& joint_axis, const Array& base_pose, bool first_slides,
+               const Indices& link, const Array& ends, const Array& radius, const Indices& kind, const Array& pose, const Array& size,
                const std::vector<std::array<Array, 4>>& hulls, const Indices& environment, const Indices& self_pairs);
 
 }  // namespace ir

@@ -83,7 +83,7 @@ void Model::finish() {  // long: one layout of lanes per kind of body, filled si
     extent = std::max(extent, std::min(std::sqrt(away), 3.0 * reach + largest) + largest);
   }
   float_margin = 32.0 * std::ldexp(1.0, -24) * extent;
-  wide = extent > 12.0;
+  wide = extent > 12.0 || chain.first_slides;  // how far a rail reaches isn't known here
   split(order, 0, static_cast<int>(order.size()), centre);
   const auto box_of = [](const double low[3], const double high[3], int body) {
     Box box{};
@@ -194,7 +194,8 @@ template <class V> void Placement<V>::place(const double* const* rows, int count
     Vec<V> ignored;
     if (joint.turn == Joint::oblique) narrow(low.z, high.z, f.z);
     else joint.tilt(before, ignored, f.z);
-    if (joint.shift.is_zero()) f.origin = before.origin;
+    const bool slides = link == 1 && model_.chain.first_slides;
+    if (joint.shift.is_zero() && !slides) f.origin = before.origin;
     else narrow(low.origin, high.origin, f.origin);
     state.origin[link] = f.origin;
     state.axis[link] = f.z;

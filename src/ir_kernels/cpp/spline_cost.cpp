@@ -61,7 +61,7 @@ std::vector<double> widest(const SplineTerms& t, int pairs) {
   return most;
 }
 
-// Along the links, whatever the joint values.
+// Along the links, whatever the joint values; of a rail 1: what it moves goes as far as itself.
 std::vector<double> levers(const Model& model) {
   const int n = model.chain.n;
   std::vector<double> to_joint(n + 1, 0.0), longest(n, 0.0);
@@ -78,6 +78,7 @@ std::vector<double> levers(const Model& model) {
     }
     for (int k = 0; k < c.link; ++k) longest[k] = std::max(longest[k], to_joint[c.link] - to_joint[k + 1] + to_end);
   }
+  if (model.chain.first_slides) longest[0] = 1.0;
   return longest;
 }
 

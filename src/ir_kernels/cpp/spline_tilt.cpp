@@ -36,7 +36,7 @@ double SplineCost::tilt(double step) {
       of_step_ += penalty;
       if (sine > straight) weight[l] = 2.0 * terms_.clearance_penalty * step * lacks / (terms_.tilt_scale * sine);
     }
-    for (int j = 0; j < n_; ++j) g.of_q[j] -= weight * dot(around, frames_[j + 1].z);
+    for (int j = model_.chain.first_slides ? 1 : 0; j < n_; ++j) g.of_q[j] -= weight * dot(around, frames_[j + 1].z);
   }
   return cost;
 }

@@ -177,8 +177,9 @@ void slopes(const Model& model, const std::vector<Frame<Double8>>& frames, const
   }
   for (int j = 0; j < model.chain.n; ++j) {
     const Vec<Double8>&axis = frames[j + 1].z, &origin = frames[j + 1].origin;
-    const Double8 a = dot(w.normal, cross(axis, w.centre_a - origin));
-    const Double8 b = dot(w.normal, cross(axis, w.centre_b - origin));
+    const bool slides = j == 0 && model.chain.first_slides;
+    const Double8 a = dot(w.normal, slides ? axis : cross(axis, w.centre_a - origin));
+    const Double8 b = dot(w.normal, slides ? axis : cross(axis, w.centre_b - origin));
     gradient[j] = (j < link_a ? a : Double8{}) - (j < link_b ? b : Double8{});
   }
 }

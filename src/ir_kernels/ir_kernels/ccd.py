@@ -80,8 +80,12 @@ def ccd(
     position_max] (n,)
     that minimises Psi: closed form per joint, so Psi never grows. Starts outside the limits are
     moved onto them. Starts don't know of each other: a start ends the same in any batch. Raises
-    KernelError.
+    KernelError, also for a chain with a rail.
     """
+    if chain.first_slides:
+        raise KernelError(
+            "joint 1 is a rail: coordinate descent turns joints, give it the arm alone"
+        )
     settings = CcdSettings() if settings is None else settings
     target = data.pose(pose, "pose")
     first = checked("starts", starts, None, chain.n)

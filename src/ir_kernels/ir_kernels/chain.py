@@ -1,5 +1,5 @@
-"""A serial chain of revolute joints: poses of its links and of the tool centre point, and the
-Jacobian.
+"""A serial chain of revolute joints, the first of which may be a rail: poses of its links and of
+the tool centre point, and the Jacobian.
 """
 
 from dataclasses import dataclass
@@ -20,8 +20,9 @@ class Chain:
     """Kinematics of `robot`, standing at `base_pose` in the world, with `tcp` the pose of its tool
     point in link n.
 
-    `robot` gives joint_origin (n, 4, 4) and joint_axis (n, 3). Joint values are (N, n) in rad;
-    limits are no business of the kinematics. Raises KernelError for anything that isn't a chain.
+    `robot` gives joint_origin (n, 4, 4) and joint_axis (n, 3). Joint values are (N, n) in rad, of a
+    joint 1 that slides (`first_slides`) in m; limits are no business of the kinematics. Raises
+    KernelError for anything that isn't a chain.
     """
 
     robot: ChainLike
@@ -29,6 +30,7 @@ class Chain:
     tcp: FloatArray
     joint_origin: FloatArray
     joint_axis: FloatArray
+    first_slides: bool
 
     def __init__(
         self, robot: ChainLike, base_pose: ArrayLike | None = None, tcp: ArrayLike | None = None
@@ -41,6 +43,10 @@ class Chain:
             raise KernelError("joint_origin has length 0: a chain has at least one joint")
         if (np.abs(length - 1.0) > AXIS_TOLERANCE).any():
             raise KernelError(f"joint_axis has lengths {length}: expected unit vectors")
+        slides = bool(getattr(robot, "first_slides", False))
+        if slides and len(origin) == 1:
+            raise KernelError("joint_origin has length 1: a rail carries at least one joint")
+        object.__setattr__(self, "first_slides", slides)
         object.__setattr__(self, "robot", robot)
         object.__setattr__(
             self, "base_pose", data.pose(identity if base_pose is None else base_pose, "base_pose")
@@ -64,9 +70,11 @@ class Chain:
         if compiled.MODULE is None:
             from ir_kernels.reference import chain as reference
 
-            return reference.link_poses(self.joint_origin, self.joint_axis, self.base_pose, q)
+            return reference.link_poses(
+                self.joint_origin, self.joint_axis, self.base_pose, q, self.first_slides
+            )
         poses: FloatArray = compiled.MODULE.link_poses(
-            self.joint_origin, self.joint_axis, self.base_pose, q
+            self.joint_origin, self.joint_axis, self.base_pose, q, self.first_slides
         )
         return poses
 
@@ -77,14 +85,16 @@ class Chain:
 
     def jacobian(self, q: ArrayLike) -> FloatArray:
         """(N, 6, n): linear [m/rad], then angular velocity of the tcp in the world, per joint
-        velocity, at q (N, n).
+        velocity, at q (N, n); of a rail its direction and 0.
         """
         q = self.checked(q)
         if compiled.MODULE is None:
             from ir_kernels.reference import chain as reference
 
-            return reference.jacobian(self.joint_axis, self.link_poses(q), self.tcp)
+            return reference.jacobian(
+                self.joint_axis, self.link_poses(q), self.tcp, self.first_slides
+            )
         result: FloatArray = compiled.MODULE.jacobian(
-            self.joint_origin, self.joint_axis, self.base_pose, self.tcp, q
+            self.joint_origin, self.joint_axis, self.base_pose, self.tcp, q, self.first_slides
         )
         return result

@@ -218,6 +218,7 @@ def core_of(geometry: Geometry, module: compiled.Core) -> compiled.Core:
         chain.joint_origin,
         chain.joint_axis,
         chain.base_pose,
+        chain.first_slides,
         capsules.link,
         capsules.ends,
         capsules.radius,

@@ -19,7 +19,9 @@ T = TypeVar("T", bound=np.generic)
 
 
 class ChainLike(Protocol):
-    """Kinematics of a serial chain of revolute joints."""
+    """Kinematics of a serial chain of revolute joints. Where it has `first_slides` and that is
+    true, joint 1 is a rail: it slides along its axis, its values are in m.
+    """
 
     @property
     def joint_origin(self) -> FloatArray:

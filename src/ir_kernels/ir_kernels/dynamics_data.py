@@ -80,7 +80,10 @@ class LoadLike(Protocol):
 
 
 class RobotLike(ChainLike, Protocol):
-    """Links and drives of a serial chain."""
+    """Links and drives of a serial chain. Of a rail (`first_slides`) the figures are those of a
+    drive that pushes: kg, N s/m, N and motor rad per m where a joint that turns has kg m^2, Nm
+    s/rad, Nm and 1.
+    """
 
     @property
     def link_mass(self) -> FloatArray:
@@ -166,7 +169,8 @@ class DynamicsData:
     viscous, coulomb, gear_ratio, copper_loss, iron_loss, inverter_loss, gear_loss, idle_loss (n,):
     the drives, figures of the motors seen at their joints. coupling: of motors and joints.
     envelope_speed (n, K), envelope_torque (n, K + 1): torque available, a step down at
-    the first speed.
+    the first speed. first_slides: joint 1 is a rail, which moves all of the mass; N and m for Nm
+    and rad.
     """
 
     origin: FloatArray
@@ -188,6 +192,7 @@ class DynamicsData:
     envelope_torque: FloatArray
     counterbalance: CounterbalanceData | None
     coupling: Coupling
+    first_slides: bool = False
 
     @property
     def n(self) -> int:
@@ -258,6 +263,17 @@ def _further_losses(robot: RobotLike, n: int) -> dict[str, FloatArray]:
     return {k: _frozen(f"robot.{k}", getattr(robot, k, np.zeros(n)), (n,)) for k in FURTHER_LOSSES}
 
 
+def _check_rail(data: DynamicsData) -> None:
+    """Refuse what a rail can't be."""
+    turns = data.coupling.turns
+    if data.n == 1:
+        raise KernelError("robot has 1 joint: a rail carries at least one that turns")
+    if turns[0, 1:].any() or turns[1:, 0].any() or turns[0, 0] != 1.0:
+        raise KernelError("robot.motor_turns couples the rail with another joint")
+    if data.counterbalance is not None and data.counterbalance.joint == 0:
+        raise KernelError("counterbalance: joint 0 is a rail, it has none")
+
+
 def dynamics_data(
     robot: RobotLike, loads: Sequence[LoadLike], base_pose: ArrayLike, gravity: float
 ) -> DynamicsData:
@@ -296,7 +312,10 @@ def dynamics_data(
         coupling=Coupling(
             _frozen("robot.motor_turns", getattr(robot, "motor_turns", np.eye(n)), (n, n))
         ),
+        first_slides=bool(getattr(robot, "first_slides", False)),
     )
+    if data.first_slides:
+        _check_rail(data)
     if (data.gear_ratio == 0.0).any():
         raise KernelError("robot.gear_ratio holds a zero")
     if (np.diff(data.envelope_speed, axis=1) <= 0.0).any() or (data.envelope_speed < 0.0).any():

@@ -1,5 +1,7 @@
 """Inverse kinematics of 6R arms: in closed form where axes allow it, else by a search over q4."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -364,13 +366,79 @@ def _distinct(pose: IntArray, q: FloatArray) -> list[Found]:
     return found
 
 
+# An arm on a rail: six axes at each of some places of the rail.
+
+RAIL_STEP = 0.25  # m between places of a rail
+RAIL_PLACES = 41  # and how many they are at most
+
+
+class RailIk:
+    """Configurations within position_min, position_max (7,) [m, rad] that bring `chain`'s tcp to a
+    pose with the rail at one of `places` (P,) m: all of the arm's there. None: places that divide
+    the travel evenly, RAIL_STEP apart or RAIL_PLACES of them.
+
+    branch: of the arm. Raises KernelError as `inverse_kinematics` of the arm does.
+    """
+
+    def __init__(
+        self,
+        chain: Chain,
+        position_min: ArrayLike,
+        position_max: ArrayLike,
+        places: ArrayLike | None = None,
+    ) -> None:
+        low, high = (np.array(ends, np.float64) for ends in (position_min, position_max))
+        if places is None:
+            count = int(np.ceil((high[0] - low[0]) / RAIL_STEP)) + 1
+            places = np.linspace(low[0], high[0], min(max(count, 2), RAIL_PLACES))
+        self.places = data.array(np.atleast_1d(np.asarray(places, np.float64)), "places", (None,))
+        if (self.places < low[0]).any() or (self.places > high[0]).any():
+            raise KernelError(f"places must be in [{low[0]:g}, {high[0]:g}] m")
+        self._along = portable.matmul(chain.joint_origin[0][:3, :3], chain.joint_axis[0])
+        self._along = portable.matmul(chain.base_pose[:3, :3], self._along)
+        standing = portable.matmul(chain.base_pose, chain.joint_origin[0])
+        arm = Chain(_Arm(chain.joint_origin[1:], chain.joint_axis[1:]), standing, chain.tcp)
+        self._arm = inverse_kinematics(arm, low[1:], high[1:])
+
+    def with_places(self, places: ArrayLike) -> "RailIk":
+        """The same for other places (P,) [m]."""
+        other: RailIk = object.__new__(RailIk)
+        other.__dict__.update(self.__dict__)
+        other.places = np.atleast_1d(np.asarray(places, np.float64))
+        return other
+
+    def solve(self, poses: ArrayLike) -> IkSet:
+        """All solutions for poses (N, 4, 4) of the tcp in the world; tcp(q) meets the pose to 1e-9
+        m and 1e-9 rad.
+        """
+        targets = shaped("poses", poses, None, 4, 4)
+        data.poses(targets, "poses")
+        count = len(self.places)
+        moved = np.repeat(targets, count, axis=0)
+        moved[:, :3, 3] -= np.tile(self.places, len(targets))[:, None] * self._along
+        found = self._arm.solve(np.ascontiguousarray(moved))
+        q = np.column_stack([self.places[found.pose_index % count], found.q])
+        arrays = np.ascontiguousarray(q), found.pose_index // count, found.branch
+        return IkSet(*(data.read_only(np.array(array)) for array in arrays))
+
+
+class _Arm(NamedTuple):
+    """The joints of an arm without its rail."""
+
+    joint_origin: FloatArray
+    joint_axis: FloatArray
+
+
 def inverse_kinematics(
     chain: Chain, position_min: ArrayLike, position_max: ArrayLike
 ) -> InverseKinematics:
-    """All configurations within the limits (6,) rad that bring `chain`'s tcp to a pose.
+    """All configurations within the limits (6,) rad that bring `chain`'s tcp to a pose; on a rail
+    (7,), at places that divide its travel evenly (`RailIk`).
 
     Raises KernelError for an arm that has not six axes, or whose axes 2 and 3 are not parallel.
     """
+    if chain.first_slides:
+        return RailIk(chain, position_min, position_max)
     lines = arm_lines(chain)
     if has_spherical_wrist(chain):
         return SphericalWristIk(chain, position_min, position_max)

@@ -159,7 +159,8 @@ class SweptArm:
         turned = np.einsum("ncab,ceb->ncea", frames[..., :3, :3], self.capsules.ends)
         segments = turned + frames[:, :, None, :3, 3]
         axes = kinematics.axes(self.chain.joint_axis, poses)
-        moved = certify.capsule_bounds(self.capsules.link, axes, segments, spread)[:, :, 0]
+        slides = self.chain.first_slides
+        moved = certify.capsule_bounds(self.capsules.link, axes, segments, spread, slides)[:, :, 0]
         self.segments = np.concatenate([self.segments, segments])
         self.moved = np.concatenate([self.moved, moved])
 

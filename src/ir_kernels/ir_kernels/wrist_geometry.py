@@ -57,8 +57,8 @@ class ArmLines:
 
 def arm_lines(chain: Chain) -> ArmLines:
     """The lines of a chain. KernelError names what no method here solves."""
-    if chain.n != 6:
-        raise KernelError(f"the arm has {chain.n} axes: inverse kinematics needs 6")
+    if chain.n != 6 or chain.first_slides:
+        raise KernelError(f"the arm has {chain.n} axes: inverse kinematics needs 6 that turn")
     frames = (
         portable.matmul(portable.inv(chain.base_pose), chain.link_poses(np.zeros((1, 6)))[0])
     )[1:]
@@ -145,8 +145,8 @@ def wrist_geometry(chain: Chain) -> WristGeometry:
     """Derive the constants of `chain`; KernelError names the condition that it breaks, with the
     value.
     """
-    if chain.n != 6:
-        raise KernelError(f"chain has {chain.n} joints, the closed form needs 6")
+    if chain.n != 6 or chain.first_slides:
+        raise KernelError(f"chain has {chain.n} joints, the closed form needs 6 that turn")
     to_base = portable.inv(chain.base_pose)
     links = portable.matmul(to_base, chain.link_poses(np.zeros((1, 6)))[0])
     frames = links[1:]

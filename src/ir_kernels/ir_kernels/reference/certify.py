@@ -7,7 +7,8 @@ other, the outermost first, j = i..k+1:
     m <- m + spread_j (reach_j + m)
 
 reach_j is the distance of the capsule's axis from joint axis j in the middle: a point that has
-moved by m already is at most reach_j + m away from axis j, which has not moved yet. A distance in
+moved by m already is at most reach_j + m away from axis j, which has not moved yet. A rail
+moves every point by as much as itself: m <- m + spread_1. A distance in
 the middle that exceeds threshold + m therefore proves the interval. An interval that is not proved
 is halved, down to a movement of RESOLUTION; the rest is undecided.
 """
@@ -118,7 +119,7 @@ def motion_bounds(
     n) [m].
     """
     axes = chain.axes(model.chain.joint_axis, link_poses)
-    bound = capsule_bounds(model.capsules.link, axes, segments, spread)
+    bound = capsule_bounds(model.capsules.link, axes, segments, spread, model.chain.first_slides)
     outside = bound[:, model.environment[:, 0], 0]
     links = model.capsules.link
     a, b = model.self_pairs.T
@@ -128,10 +129,15 @@ def motion_bounds(
 
 
 def capsule_bounds(
-    links: IntArray, axes: tuple[FloatArray, FloatArray], segments: FloatArray, spread: FloatArray
+    links: IntArray,
+    axes: tuple[FloatArray, FloatArray],
+    segments: FloatArray,
+    spread: FloatArray,
+    first_slides: bool,
 ) -> FloatArray:
     """(I, C, n + 1): how far capsule c of `links` (C,) can move, seen from link k <= its own, while
-    joint j moves by at most spread_j (I, n) [m]; axes: origins and directions (I, n, 3).
+    joint j moves by at most spread_j (I, n) [m]; axes: origins and directions (I, n, 3);
+    first_slides: joint 1 is a rail.
     """
     origin, direction = axes
     bound = np.zeros((len(segments), len(links), spread.shape[1] + 1))
@@ -140,7 +146,8 @@ def capsule_bounds(
         for j in range(link - 1, -1, -1):
             arm = segments[:, c] - origin[:, None, j]
             reach = np.linalg.norm(np.cross(arm, direction[:, None, j]), axis=-1).max(axis=1)
-            moved = moved + spread[:, j] * (reach + moved)
+            slides = first_slides and j == 0
+            moved = moved + spread[:, j] * (1.0 if slides else reach + moved)
             bound[:, c, j] = moved
     return bound
 

@@ -1,5 +1,5 @@
-"""Forward kinematics and Jacobians of a serial chain of revolute joints, as product of
-transforms.
+"""Forward kinematics and Jacobians of a serial chain of revolute joints, the first of which may be
+a rail, as product of transforms.
 """
 
 import numpy as np
@@ -20,14 +20,22 @@ def axis_rotation(axis: FloatArray, angle: FloatArray) -> FloatArray:
 
 
 def link_poses(
-    joint_origin: FloatArray, joint_axis: FloatArray, base_pose: FloatArray, q: FloatArray
+    joint_origin: FloatArray,
+    joint_axis: FloatArray,
+    base_pose: FloatArray,
+    q: FloatArray,
+    first_slides: bool = False,
 ) -> FloatArray:
     """(N, n + 1, 4, 4): poses of the links 0..n in the world at q (N, n)."""
     result = np.empty((len(q), len(joint_axis) + 1, 4, 4))
     result[:, 0] = base_pose
     for i, (origin, axis) in enumerate(zip(joint_origin, joint_axis, strict=True)):
         turn = np.zeros((len(q), 4, 4))
-        turn[:, :3, :3] = axis_rotation(axis, q[:, i])
+        if first_slides and i == 0:
+            turn[:, :3, :3] = np.eye(3)
+            turn[:, :3, 3] = q[:, :1] * axis
+        else:
+            turn[:, :3, :3] = axis_rotation(axis, q[:, i])
         turn[:, 3, 3] = 1.0
         result[:, i + 1] = portable.matmul(result[:, i], origin, turn)
     return result
@@ -42,21 +50,32 @@ def axes(joint_axis: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatAr
 
 
 def point_jacobian(
-    joint_axis: FloatArray, poses: FloatArray, points: FloatArray, link: FloatArray | int
+    joint_axis: FloatArray,
+    poses: FloatArray,
+    points: FloatArray,
+    link: FloatArray | int,
+    first_slides: bool = False,
 ) -> FloatArray:
     """(N, 3, n): velocity in the world of points (N, 3) fixed to `link` (one, or (N,)), per joint
     velocity.
     """
     origin, direction = axes(joint_axis, poses)
     columns = np.cross(direction, points[:, None] - origin)
+    if first_slides:
+        columns[:, 0] = direction[:, 0]
     moved = np.arange(1, len(joint_axis) + 1) <= np.broadcast_to(link, len(points))[:, None]
     return (columns * moved[..., None]).transpose(0, 2, 1)
 
 
-def jacobian(joint_axis: FloatArray, poses: FloatArray, tcp: FloatArray) -> FloatArray:
+def jacobian(
+    joint_axis: FloatArray, poses: FloatArray, tcp: FloatArray, first_slides: bool = False
+) -> FloatArray:
     """(N, 6, n): linear, then angular velocity of the tcp (4, 4 in link n) in the world, per joint
     velocity.
     """
     point = (portable.matmul(poses[:, -1], tcp))[:, :3, 3]
-    linear = point_jacobian(joint_axis, poses, point, len(joint_axis))
-    return np.concatenate([linear, axes(joint_axis, poses)[1].transpose(0, 2, 1)], axis=1)
+    linear = point_jacobian(joint_axis, poses, point, len(joint_axis), first_slides)
+    angular = axes(joint_axis, poses)[1].transpose(0, 2, 1)
+    if first_slides:
+        angular[:, :, 0] = 0.0
+    return np.concatenate([linear, angular], axis=1)

@@ -12,9 +12,8 @@ from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 def poses(model: Geometry, q: FloatArray) -> FloatArray:
     """(N, n + 1, 4, 4): link poses at q (N, n)."""
-    return chain.link_poses(
-        model.chain.joint_origin, model.chain.joint_axis, model.chain.base_pose, q
-    )
+    arm = model.chain
+    return chain.link_poses(arm.joint_origin, arm.joint_axis, arm.base_pose, q, arm.first_slides)
 
 
 def ends(model: Geometry, link_poses: FloatArray) -> FloatArray:
@@ -105,8 +104,10 @@ def gradient(
     both = np.concatenate([model.environment * [1, 0], model.self_pairs])[pairs]
     link = model.capsules.link[both]
     axis = model.chain.joint_axis
-    moved_a = chain.point_jacobian(axis, link_poses, found.on_segment, link[:, 0])
-    moved_b = chain.point_jacobian(axis, link_poses, found.on_body, np.where(own, link[:, 1], 0))
+    slides = model.chain.first_slides
+    second = np.where(own, link[:, 1], 0)
+    moved_a = chain.point_jacobian(axis, link_poses, found.on_segment, link[:, 0], slides)
+    moved_b = chain.point_jacobian(axis, link_poses, found.on_body, second, slides)
     result: FloatArray = np.einsum("na,nai->ni", found.normal, moved_a - moved_b)
     return result
 

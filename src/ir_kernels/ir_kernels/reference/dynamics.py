@@ -8,7 +8,8 @@ Where motors turn with other joints, w = T qd: tau = T^-T (H qdd + h - T_cb) + J
 F_c sign(w) (`ir_kernels.coupling`).
 
 Recursive Newton-Euler in link frames (Luh, Walker, Paul 1980), composite bodies for H (Walker, Orin
-1982). Arrays q, qd, qdd, tau are (N, n); rad, rad/s, rad/s^2, Nm.
+1982). Arrays q, qd, qdd, tau are (N, n); rad, rad/s, rad/s^2, Nm. A rail (`first_slides`) is
+joint 1: m and N.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,6 +24,7 @@ from ir_kernels.reference.interval import (
     add,
     apply,
     cross,
+    dot,
     joint_rotation,
     matrix,
     scale,
@@ -55,15 +57,20 @@ def _outward(
         axis = vector(data.axis[i])
         arm = vector(data.origin[i, :3, 3])
         com = vector(data.com[i])
-        R = joint_rotation(data.origin[i], data.axis[i], sin[i], cos[i])
+        slides = data.first_slides and i == 0
+        if slides:
+            R = matrix(data.origin[i, :3, :3])
+        else:
+            R = joint_rotation(data.origin[i], data.axis[i], sin[i], cos[i])
         to_link = transpose(R)
         acceleration = add(acceleration, add(cross(spin_rate, arm), cross(spin, cross(spin, arm))))
         acceleration = apply(to_link, acceleration)
+        if slides:
+            acceleration = add(acceleration, scale(axis, qdd[i]))
         carried = apply(to_link, spin)
-        relative = scale(axis, qd[i])
-        spin_rate = add(
-            apply(to_link, spin_rate), add(scale(axis, qdd[i]), cross(carried, relative))
-        )
+        relative = scale(axis, zero if slides else qd[i])
+        turned = scale(axis, zero if slides else qdd[i])
+        spin_rate = add(apply(to_link, spin_rate), add(turned, cross(carried, relative)))
         spin = add(carried, relative)
         of_com = add(acceleration, add(cross(spin_rate, com), cross(spin, cross(spin, com))))
         force = scale(of_com, float(data.mass[i]))
@@ -89,7 +96,7 @@ def rigid_body_torque(
     for i in reversed(range(data.n)):
         axis = vector(data.axis[i])
         arm = vector(data.origin[i, :3, 3])
-        torque[i] = axis[0] * moments[i][0] + axis[1] * moments[i][1] + axis[2] * moments[i][2]
+        torque[i] = dot(axis, forces[i] if data.first_slides and i == 0 else moments[i])
         if i > 0:
             force = apply(rotations[i], forces[i])
             forces[i - 1] = add(forces[i - 1], force)
@@ -204,8 +211,15 @@ def mass_matrix(data: DynamicsData, q: FloatArray) -> FloatArray:
     sin = np.sin(q)
     cos = np.cos(q)
     for i in range(n):
+        slides = data.first_slides and i == 0
         p = p + R @ data.origin[i, :3, 3]
-        local = joint_rotation(data.origin[i], data.axis[i], sin[:, i], cos[:, i])
+        # where a rail stands changes no inertia: it is left at 0
+        local = joint_rotation(
+            data.origin[i],
+            data.axis[i],
+            np.zeros(N) if slides else sin[:, i],
+            np.ones(N) if slides else cos[:, i],
+        )
         R = R @ np.moveaxis(np.array(local), 2, 0)
         com = p + R @ data.com[i]
         axes[i] = R @ data.axis[i]
@@ -219,13 +233,17 @@ def mass_matrix(data: DynamicsData, q: FloatArray) -> FloatArray:
             masses[i] = masses[i] + masses[i + 1]
             moments[i] = moments[i] + moments[i + 1]
             inertias[i] = inertias[i] + inertias[i + 1]
-        # momentum of the composite turning about axis i with unit speed
+        # momentum of the composite turning about axis i with unit speed, or sliding along it
+        if data.first_slides and i == 0:
+            H[:, 0, 0] = masses[0]
+            break
         velocity = np.cross(origins[i], axes[i])
         linear = masses[i][:, None] * velocity + np.cross(axes[i], moments[i])
         angular = np.einsum("nij,nj->ni", inertias[i], axes[i]) + np.cross(moments[i], velocity)
         for j in range(i + 1):
             about_j = angular - np.cross(origins[j], linear)
-            H[:, i, j] = H[:, j, i] = np.einsum("ni,ni->n", axes[j], about_j)
+            owed = linear if data.first_slides and j == 0 else about_j
+            H[:, i, j] = H[:, j, i] = np.einsum("ni,ni->n", axes[j], owed)
     return H
 
 

@@ -307,6 +307,8 @@ class SplineCost:
         turning = np.einsum("kjab,jb->kja", poses[:, 1:, :3, :3], self.geometry.chain.joint_axis)
         slopes = -np.einsum("kja,ka->kj", turning, around) / np.maximum(sine, STRAIGHT)[:, None]
         slopes[sine <= STRAIGHT] = 0.0
+        if self.geometry.chain.first_slides:
+            slopes[:, 0] = 0.0
         s.of_q += (2.0 * t.clearance_penalty * step / t.tilt_scale) * lacks[:, None] * slopes
         rate = t.clearance_penalty * float(np.sum(lacks**2))
         s.of_step += rate
