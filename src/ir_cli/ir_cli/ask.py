@@ -137,7 +137,9 @@ def run_escape(arguments: argparse.Namespace) -> int:
             f"{pair.body_a} and {pair.body_b} ({pair.kind}): {1e3 * pair.distance:.1f} mm, "
             f"{1e3 * left:.1f} mm at the end\n"
         )
-    end = " ".join(f"A{k} {value:.2f}" for k, value in enumerate(np.degrees(plan.waypoints[-1]), 1))
+    robot = planner.cell.robot
+    last = robot.in_people_units(plan.waypoints[-1])
+    end = " ".join(f"{robot.axis_label(k)} {value:.2f}" for k, value in enumerate(last))
     sys.stdout.write(f"it ends at {end}\n")
     return 0
 
@@ -290,9 +292,13 @@ def run_ik(arguments: argparse.Namespace) -> int:
     elif arguments.csv:
         print_csv(rows)
     else:
-        joints = planner.cell.robot.joint_names
+        robot = planner.cell.robot
         titles = {
-            name: (f"A{k} deg", number(1, 180.0 / np.pi)) for k, name in enumerate(joints, start=1)
+            name: (
+                f"{robot.axis_label(k)} {robot.unit(k)}",
+                number(1, 180.0 / np.pi) if k >= robot.base else number(3),
+            )
+            for k, name in enumerate(robot.joint_names)
         }
         ends = {
             "clearance": ("clearance mm", number(1, 1e3)),

@@ -241,7 +241,7 @@ def _judged(points: FloatArray, count: int, station: Station, scene: PlanningSce
 def _by_hand(z: int, scene: PlanningScene) -> bool:
     """Whether a pair is one of the hand, or of what it holds, with a body."""
     capsules = (*scene.cell.robot.capsules, *(c for load in scene.loads for c in load.capsules))
-    hand = {capsule.name for capsule in capsules if capsule.link >= HAND}
+    hand = {capsule.name for capsule in capsules if capsule.link >= HAND + scene.cell.robot.base}
     pair = scene.collision.pairs[z]
     return pair.kind != "SELF" and pair.body_a in hand
 

@@ -104,7 +104,8 @@ def _angles_deg(cell: Cell) -> Iterator[tuple[str, FloatArray]]:
         poses += [(body.name, body.pose) for body in _first_of_pose(part.bodies)]
     poses += [(station.name, station.pose_in_equipment) for station in cell.stations]
     yield from ((subject, abc_from_rotation(pose[:3, :3])) for subject, pose in poses)
-    yield from (("home", np.degrees(cell.machine_home)), ("park", np.degrees(cell.park)))
+    for name in ("home", "park"):
+        yield name, np.degrees(cell.posture(name)[cell.robot.base :])
 
 
 def _first_of_pose(bodies: Iterable[Body]) -> Iterable[Body]:
@@ -152,8 +153,25 @@ def _capsule_bounds(capsule: Capsule) -> tuple[FloatArray, FloatArray]:
     return ends.min(axis=0) - capsule.radius, ends.max(axis=0) + capsule.radius
 
 
+def _shoulder(cell: Cell) -> FloatArray:
+    """Where (3,) A1 is in the world, on a rail at 0."""
+    robot = cell.robot
+    shoulder = cell.base_pose @ robot.joint_origin[robot.base]
+    return np.asarray(shoulder[:3, 3])
+
+
+def _from_shoulder(point: FloatArray, shoulder: FloatArray, cell: Cell) -> float:
+    """How far [m] a point (3,) is from A1, on a rail from where that brings it nearest."""
+    rail = cell.robot.rail
+    away = point - shoulder
+    if rail is not None:
+        along = cell.base_pose[:3, :3] @ rail.axis
+        away = away - np.clip(away @ along, rail.low, rail.high) * along
+    return float(np.linalg.norm(away))
+
+
 def _stations(cell: Cell) -> Iterator[CellFinding]:
-    shoulder = cell.base_pose @ cell.robot.joint_origin[0]
+    shoulder = _shoulder(cell)
     reach = _reach(cell)
     machines = {machine.name: machine for machine in cell.equipment}
     around = _bodies_around(cell)
@@ -165,7 +183,7 @@ def _stations(cell: Cell) -> Iterator[CellFinding]:
                 yield CellFinding(
                     "error", station.name, f"its tcp is {-depth:.3f} m inside {body.name}"
                 )
-        distance = float(np.linalg.norm(point - shoulder[:3, 3]))
+        distance = _from_shoulder(point, shoulder, cell)
         if distance > reach:
             unit = "; lengths are in m, not in mm" if distance > _FAR * reach else ""
             sentence = f"its tcp is {distance:.3f} m from A1, the arm reaches {reach:.3f} m{unit}"
@@ -197,7 +215,7 @@ def _bodies_around(cell: Cell) -> list[list[Body]]:
 
 def _reach(cell: Cell) -> float:
     """Upper bound of the distance of the tcp from the first joint's frame."""
-    offsets = np.linalg.norm(cell.robot.joint_origin[1:, :3, 3], axis=1)
+    offsets = np.linalg.norm(cell.robot.joint_origin[cell.robot.base + 1 :, :3, 3], axis=1)
     return float(offsets.sum() + np.linalg.norm(cell.tcp[:3, 3]))
 
 

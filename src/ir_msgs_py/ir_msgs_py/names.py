@@ -11,6 +11,14 @@ from __future__ import annotations
 from typing import Final
 
 JOINT_NAMES: Final = ("joint_a1", "joint_a2", "joint_a3", "joint_a4", "joint_a5", "joint_a6")
+EXTERNAL_AXES: Final = ("E1", "E2", "E3", "E4", "E5", "E6")
+"""Joints of these names are linear units: their positions are in m, not in rad."""
+
+
+def joint_unit(joint: str, unit: str = "rad") -> str:
+    """A unit of joints that turn ("rad/s") as it is for this one: of an external axis with m."""
+    return unit.replace("rad", "m") if joint in EXTERNAL_AXES else unit
+
 
 WORLD_FRAME: Final = "cell"
 BASE_FRAME: Final = "base_link"

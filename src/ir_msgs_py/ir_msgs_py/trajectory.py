@@ -17,9 +17,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ir_msgs_py.names import EXTERNAL_AXES
 from ir_values.argument_types import typed_methods
 from ir_values.arrays import FloatArray, IntArray, set_field
 from ir_values.errors import JointNamesError, TrajectoryError
+
+
+def in_people_units(joint_names: Sequence[str], values: FloatArray) -> FloatArray:
+    """Positions (..., n) [rad, m], or their derivatives, in degrees, of external axes in m."""
+    slides = [name in EXTERNAL_AXES for name in joint_names]
+    return np.asarray(np.where(slides, values, np.degrees(values)))
+
 
 # Hermite polynomials between trajectory points. A quintic segment reproduces a cubic one exactly,
 # so planners of splines send one point per knot.

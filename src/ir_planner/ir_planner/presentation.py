@@ -12,7 +12,7 @@ import numpy as np
 
 from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
-from ir_msgs_py.trajectory import JointTrajectory
+from ir_msgs_py.trajectory import JointTrajectory, in_people_units
 from ir_values.arrays import FloatArray
 
 _DIGITS = 10  # of a mm, at most
@@ -70,16 +70,17 @@ def _figure(rows: int) -> tuple[Any, list[Any]]:
 
 
 def plot_trajectory(trajectory: JointTrajectory | None, title: str) -> Any:
-    """The joints' angles and speeds over time, as a matplotlib figure; of no trajectory the title
-    alone.
+    """The joints' angles and speeds over time, as a matplotlib figure, of a rail in m and m/s; of
+    no trajectory the title alone.
     """
     figure, (angles, speeds) = _figure(2)
     figure.suptitle(title, wrap=True, fontsize="medium")
     if trajectory is not None:
         times = np.linspace(0.0, float(trajectory.times[-1]), _SAMPLES)
         motion = trajectory.sample(times)
-        angles.plot(times, np.degrees(motion.q), label=trajectory.joint_names)
-        speeds.plot(times, np.degrees(motion.qd))
+        names = trajectory.joint_names
+        angles.plot(times, in_people_units(names, motion.q), label=names)
+        speeds.plot(times, in_people_units(names, motion.qd))
         angles.legend(fontsize="small")
     angles.set_ylabel("angle [deg]")
     speeds.set_ylabel("speed [deg/s]")

@@ -32,12 +32,14 @@ from ir_description.cell.program import (
 from ir_description.poses import composed, inverse
 from ir_description.robot import Load, RobotModel, total_mass
 from ir_description.shapes import Body, Capsule, floor_body
+from ir_kernels import portable
 from ir_msgs_py.cartesian import CartesianPath
 from ir_values.arrays import FloatArray, frozen, frozen_pose
 from ir_values.errors import InvalidValueError, UnknownNameError
 
 BODIES_MAX = 10_000
 """Most bodies a cell may have."""
+_LEVEL = 1e-6  # of the direction of a rail: it keeps its height above the floor
 
 
 class _Cell(Protocol):
@@ -254,8 +256,8 @@ def check_path(
 
 
 def check_base_contact(robot: RobotModel, capsule: str, body: str, bodies: Collection[str]) -> None:
-    """Refuse a base contact that is not a capsule of base_link with a body."""
-    base = [c.name for c in robot.capsules if c.link == 0]
+    """Refuse a base contact that is not a capsule of base_link, or of its carriage, with a body."""
+    base = [c.name for c in robot.capsules if c.link <= robot.base]
     if capsule not in base:
         raise UnknownNameError("capsule of base_link", capsule, base)
     if body not in bodies:
@@ -327,10 +329,12 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """base_pose (4, 4) of base_link in the world; tcp (4, 4) in the last link.
+    """base_pose (4, 4) of base_link in the world, on a rail where that is at 0; tcp (4, 4) in the
+    last link.
 
-    park and machine_home (n,) [rad] are the two named postures. base_contacts: pairs of a capsule
-    of base_link and a body that touch for good (a pedestal); `ignored_pairs` adds the floor.
+    park and machine_home (n,) [rad, of a rail m] are the two named postures. base_contacts: pairs
+    of a capsule of base_link and a body that touch for good (a pedestal); `ignored_pairs` adds the
+    floor.
     whole_loads: each stands for the tool and a part together where a program says what it carries
     ($LOAD), the first at the start; none: tool and parts as they are.
     route: what the machines with a process do to the parts, None: there are none.
@@ -473,9 +477,16 @@ class Cell:
 
     @property
     def ignored_pairs(self) -> tuple[tuple[str, str], ...]:
-        """Pairs of a capsule of base_link and a body that touch for good, the floor among them."""
-        base = tuple((c.name, "floor") for c in self.robot.capsules if c.link == 0 and self.floor)
-        return (*base, *self.base_contacts)
+        """Pairs of a capsule of base_link and a body that touch for good, the floor among them,
+        unless a rail leads to it.
+        """
+        robot = self.robot
+        base = robot.base
+        if robot.rail is not None:
+            climbs = abs(float(portable.matmul(self.base_pose[2, :3], robot.rail.axis)))
+            base = 0 if climbs > _LEVEL else base
+        named = tuple((c.name, "floor") for c in robot.capsules if c.link <= base and self.floor)
+        return (*named, *self.base_contacts)
 
     @property
     def part_routes(self) -> tuple[PartRoute, ...]:
@@ -552,8 +563,8 @@ def check_posture(robot: RobotModel, posture: FloatArray, name: str) -> None:
         high = robot.position_max[i]
         if not low <= value <= high:
             raise InvalidValueError(
-                f"{name}: {robot.joint_names[i]} is {np.degrees(value):g} deg, must be in "
-                f"[{np.degrees(low):g}, {np.degrees(high):g}] deg"
+                f"{name}: {robot.joint_names[i]} is {robot.shown(i, value)}, must be in "
+                f"{robot.shown_range(i)}"
             )
 
 

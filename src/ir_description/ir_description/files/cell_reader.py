@@ -56,8 +56,9 @@ from ir_description.files.program_reader import (
     read_step,
     read_tasks,
 )
+from ir_description.files.rail_reader import read_rail
 from ir_description.files.robot_file import read_robot, robot_of
-from ir_description.robot import Load, RobotModel
+from ir_description.robot import Load, RobotModel, on_rail
 from ir_values.arrays import FloatArray
 from ir_values.errors import CellFileError, InvalidValueError, RobotFileError, UnknownNameError
 from ir_values.files import inside, is_path
@@ -75,6 +76,7 @@ _SHARED = ("description", "floor", "parts", "equipment", "signals")
 _OF_ROBOT = (
     "base",
     "base_contacts",
+    "rail",
     "tool",
     "tcp",
     "home",
@@ -113,7 +115,7 @@ def cell_of(root: Item, robots: RobotSource, folder: Path | None) -> Cell:
         )
     table = root.table(_REQUIRED, _OPTIONAL)
     table["format"].choice((FORMAT,))
-    return _CellReader(root, table, _robot(table["robot"], robots, folder), folder).cell()
+    return _CellReader(root, table, _robot_of(table, robots, folder), folder).cell()
 
 
 def robot_cells_of(root: Item, robots: RobotSource, folder: Path | None) -> RobotCells:
@@ -122,6 +124,9 @@ def robot_cells_of(root: Item, robots: RobotSource, folder: Path | None) -> Robo
     shared["format"].choice((FORMAT,))
     entries = shared["robots"].list(*ROBOT_COUNT)
     tables = [entry.table(("name", "robot"), (*_OF_ROBOT, "starts")) for entry in entries]
+    for table in tables:
+        if "rail" in table:
+            table["rail"].fail("a cell with several robots has none on a rail yet: one robot alone")
     models = [_robot(table["robot"], robots, folder) for table in tables]
     tools = [_tool_capsules(table, model) for table, model in zip(tables, models, strict=True)]
     cells = []
@@ -153,6 +158,17 @@ def cell_errors(
         return (robot_cells_of if several else cell_of)(root, robots, folder)
 
     return document_errors(text, source, CellFileError, read)
+
+
+def _robot_of(table: Table, robots: RobotSource, folder: Path | None) -> RobotModel:
+    """The robot of a cell, on its rail where there is one."""
+    arm = _robot(table["robot"], robots, folder)
+    item = table.get("rail")
+    if item is None:
+        return arm
+    rail = read_rail(item)
+    with item.blamed():
+        return on_rail(arm, rail)
 
 
 def _robot(item: Item, robots: RobotSource, folder: Path | None) -> RobotModel:
@@ -399,10 +415,9 @@ class _CellReader:
             return default
         key = self._table.one_of(name, f"{name}_deg")
         item = self._table[key]
-        values = item.numbers(
-            self._robot.n, -3600.0, 3600.0, "deg" if key.endswith("_deg") else "rad"
-        )
-        posture = np.radians(values) if key.endswith("_deg") else values
+        degrees = key.endswith("_deg")
+        values = item.numbers(self._robot.n, -3600.0, 3600.0, "deg" if degrees else "rad")
+        posture = self._robot.from_people_units(values) if degrees else values
         with item.blamed():
             try:
                 check_posture(self._robot, posture, name)
@@ -442,7 +457,7 @@ def _other_angle_unit(key: str, values: FloatArray, robot: RobotModel) -> str:
     `key`.
     """
     degrees = key.endswith("_deg")
-    meant = values if degrees else np.radians(values)
+    meant = values if degrees else robot.from_people_units(values)
     if not ((meant >= robot.position_min) & (meant <= robot.position_max)).all():
         return ""
     name = key.removesuffix("_deg")

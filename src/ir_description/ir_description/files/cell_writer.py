@@ -26,8 +26,9 @@ from ir_description.cell import (
 )
 from ir_description.files.cell_reader import FORMAT
 from ir_description.files.program_reader import path_lines
+from ir_description.files.rail_reader import rail_lines
 from ir_description.poses import abc_from_rotation, rotation_from_abc
-from ir_description.robot import Load, ToolLimits
+from ir_description.robot import Load, RobotModel, ToolLimits
 from ir_description.shapes import Body, Capsule
 from ir_msgs_py.plc import Signal
 from ir_values.arrays import FloatArray
@@ -51,6 +52,9 @@ def _cell(cell: Cell) -> Iterator[str]:
         yield from _indented(cell.robot.document.splitlines(), 2)
     else:
         yield f"robot: {cell.robot.name}"
+    if cell.robot.rail is not None:
+        yield "rail:"
+        yield from _indented(rail_lines(cell.robot.rail, _number, _quoted), 2)
     if not np.array_equal(cell.base_pose, _IDENTITY):
         yield f"base: {{{_pose(cell.base_pose)}}}"
     if cell.base_contacts:
@@ -61,8 +65,8 @@ def _cell(cell: Cell) -> Iterator[str]:
         yield from _indented(_load(cell.tool), 2)
     if not np.array_equal(cell.tcp, _IDENTITY):
         yield f"tcp: {{{_pose(cell.tcp)}}}"
-    yield from _posture("home", cell.machine_home)
-    yield from _posture("park", cell.park)
+    yield from _posture("home", cell.machine_home, cell.robot)
+    yield from _posture("park", cell.park, cell.robot)
     yield from _block("parts", (_part(part) for part in cell.parts))
     at: dict[str, list[Station]] = {machine.name: [] for machine in cell.equipment}
     for station in cell.stations:
@@ -278,9 +282,9 @@ def _signals(signals: Sequence[Signal]) -> str:
     return f"[{', '.join(signal.text for signal in signals)}]"
 
 
-def _posture(name: str, posture: FloatArray) -> Iterator[str]:
-    degrees = np.round(np.degrees(posture), _DIGITS)
-    if np.array_equal(np.radians(degrees), posture):
+def _posture(name: str, posture: FloatArray, robot: RobotModel) -> Iterator[str]:
+    degrees = np.round(robot.in_people_units(posture), _DIGITS)
+    if np.array_equal(robot.from_people_units(degrees), posture):
         yield f"{name}_deg: {_row(degrees)}"
     else:
         yield f"{name}: {_row(posture)}"

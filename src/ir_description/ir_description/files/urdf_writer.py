@@ -127,7 +127,8 @@ def _shape(
 
 
 def _joint(root: Xml.Element, robot: RobotModel, i: int) -> None:
-    joint = Xml.SubElement(root, "joint", name=robot.joint_names[i], type="revolute")
+    kind = "prismatic" if i < robot.base else "revolute"
+    joint = Xml.SubElement(root, "joint", name=robot.joint_names[i], type=kind)
     origin = robot.joint_origin[i]
     _origin(joint, origin[:3, 3], _rpy(origin[:3, :3]))
     Xml.SubElement(joint, "parent", link=robot.link_names[i])

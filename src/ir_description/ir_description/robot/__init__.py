@@ -28,6 +28,7 @@ from ir_description.robot.power_parameters import (
     physical_bounds,
     prior,
 )
+from ir_description.robot.rail import Rail
 from ir_description.robot.rest_table import RestRow, RestTable
 from ir_description.robot.robot import (
     LIMIT_TOLERANCE,
@@ -48,6 +49,7 @@ from ir_description.robot.robot import (
     torque_constants,
     total_mass,
 )
+from ir_description.robot.robot_on_rail import RAIL_LINK, on_rail
 
 __all__ = [
     "AXIS_UNITS",
@@ -59,6 +61,7 @@ __all__ = [
     "LINK",
     "MASS_MAX",
     "OUTSIDE_MAX",
+    "RAIL_LINK",
     "RELATIVE_DEVIATION",
     "ROBOTS",
     "TOOL0",
@@ -76,6 +79,7 @@ __all__ = [
     "PlcBit",
     "PowerData",
     "PowerParameters",
+    "Rail",
     "ReducedDistance",
     "RestRow",
     "RestTable",
@@ -87,6 +91,7 @@ __all__ = [
     "fixed_frames",
     "interval_over",
     "moving_frames",
+    "on_rail",
     "parameter_unit",
     "physical_bounds",
     "prior",

@@ -15,11 +15,13 @@ import numpy as np
 
 from ir_description.poses import transformed
 from ir_description.robot.power import PowerData, without_table
+from ir_description.robot.rail import Rail
 from ir_description.shapes import Capsule
 from ir_kernels import portable
 from ir_kernels.coupling import Coupling
 from ir_kernels.errors import KernelError
 from ir_msgs_py.names import WORLD_FRAME
+from ir_msgs_py.trajectory import in_people_units
 from ir_values.arrays import FloatArray, frozen, frozen_inertia, frozen_pose, in_range
 from ir_values.errors import InvalidValueError
 
@@ -99,6 +101,9 @@ class RobotModel:
     document: the robot file as text; "" for a bundled
     robot: its name is enough. motor_turns (n, n): what a radian of each joint turns each motor,
     seen at the motor's own joint; not the identity where the axes of a wrist are coupled.
+    rail: the linear unit under the arm, which then is joint 1 and slides: m, m/s, m/s^2, m/s^3, and
+    N, kg, N s/m, rad/m, W s^2/m^2 where the others have Nm, kg m^2, Nm s/rad, 1, W s^2/rad^2; None:
+    the base stands.
     """
 
     name: str
@@ -138,6 +143,7 @@ class RobotModel:
     document: str = field(default="", repr=False)
     motor_turns: FloatArray = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
     reduced_distances: tuple[ReducedDistance, ...] = field(default=(), repr=False)
+    rail: Rail | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         n = len(self.joint_names)
@@ -197,6 +203,46 @@ class RobotModel:
     def n(self) -> int:
         """Number of joints."""
         return len(self.joint_names)
+
+    @property
+    def first_slides(self) -> bool:
+        """Whether joint 1 is a rail."""
+        return self.rail is not None
+
+    @property
+    def base(self) -> int:
+        """The link that is the arm's base: 0, or 1 on a rail."""
+        return int(self.first_slides)
+
+    def in_people_units(self, q: FloatArray) -> FloatArray:
+        """Joint values (..., n), their speeds or accelerations in degrees, of a rail in m."""
+        return in_people_units(self.joint_names, q)
+
+    def from_people_units(self, values: FloatArray) -> FloatArray:
+        """What `in_people_units` gives, back in rad and m."""
+        q = np.radians(values)
+        if self.first_slides:
+            q[..., 0] = values[..., 0]
+        return np.asarray(q)
+
+    def unit(self, joint: int) -> str:
+        """In which `in_people_units` gives a joint's values: deg or m."""
+        return "m" if joint < self.base else "deg"
+
+    def shown(self, joint: int, value: float, digits: int = 6) -> str:
+        """A value of a joint with its unit, as people read it."""
+        scale = 1.0 if joint < self.base else math.degrees(1.0)
+        return f"{scale * value:.{digits}g} {self.unit(joint)}"
+
+    def shown_range(self, joint: int) -> str:
+        """The range of a joint with its unit: [-185, 185] deg."""
+        scale = 1.0 if joint < self.base else math.degrees(1.0)
+        ends = f"{scale * self.position_min[joint]:g}, {scale * self.position_max[joint]:g}"
+        return f"[{ends}] {self.unit(joint)}"
+
+    def axis_label(self, joint: int) -> str:
+        """What people call the axis of a joint: A1 to A6, of a rail its name."""
+        return self.joint_names[0] if joint < self.base else f"A{joint - self.base + 1}"
 
     @cached_property
     def coupled(self) -> bool:

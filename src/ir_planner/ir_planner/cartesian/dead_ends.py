@@ -95,7 +95,8 @@ def _beyond_limit(here: FloatArray, step: FloatArray, scene: PlanningScene) -> s
     if over[j] <= 0.0:
         return ""
     limit = robot.position_max[j] if there[j] > robot.position_max[j] else robot.position_min[j]
-    return f"{robot.joint_names[j]} reaches its limit of {np.degrees(limit):.0f} deg there"
+    shown = f"{np.degrees(limit):.0f} deg" if j >= robot.base else robot.shown(j, limit)
+    return f"{robot.joint_names[j]} reaches its limit of {shown} there"
 
 
 def _jump(here: FloatArray, jumps: FloatArray, scene: PlanningScene) -> str:

@@ -180,9 +180,10 @@ def followed(
 def singularity(q: FloatArray, scene: PlanningScene) -> str:
     """What to add to a sentence about a configuration (n,) near a singularity, else nothing."""
     jacobian = scene.chain.jacobian(q[None])[0]
-    if abs(q[4]) < _WRIST:
-        name = scene.cell.robot.joint_names[4]
-        return f", near the singularity of the wrist ({name} is {np.degrees(q[4]):.1f} deg)"
+    wrist = 4 + scene.cell.robot.base
+    if abs(q[wrist]) < _WRIST:
+        name = scene.cell.robot.joint_names[wrist]
+        return f", near the singularity of the wrist ({name} is {np.degrees(q[wrist]):.1f} deg)"
     least = float(np.linalg.svd(jacobian, compute_uv=False)[-1])
     return ", near a singularity of the arm" if least < _SINGULAR else ""
 

@@ -62,15 +62,9 @@ def tool_derivatives(
     reach = _reach(scene, end)
     fourth = 24.0 * coefficients[:, :, 4]
     last = fourth + 120.0 * coefficients[:, :, 5] * durations[:, None]
-    v, a, j, s = (
-        np.cumsum(one, axis=1)
-        for one in (
-            top.velocity,
-            top.acceleration,
-            top.jerk,
-            np.maximum(np.abs(fourth), np.abs(last)),
-        )
-    )
+    axes = (top.velocity, top.acceleration, top.jerk, np.maximum(np.abs(fourth), np.abs(last)))
+    base = scene.cell.robot.base
+    v, a, j, s = (np.cumsum(one[:, base:], axis=1) for one in axes)
     square = v * v
     sums = np.stack(
         [
@@ -81,7 +75,10 @@ def tool_derivatives(
     )
     outermost = sums.copy()  # of the terms whose outermost axis is each one
     outermost[:, :, 1:] -= sums[:, :, :-1]
-    acceleration, jerk, snap = portable.matmul(outermost, reach)
+    bounds = portable.matmul(outermost, reach)
+    if base:  # a rail moves every place by its own motion
+        bounds = bounds + np.stack([one[:, 0] for one in axes[1:]])
+    acceleration, jerk, snap = bounds
     return ToolDerivatives(
         trajectory.times,
         acceleration,
@@ -94,9 +91,10 @@ def tool_derivatives(
 
 def _reach(scene: PlanningScene, end: float) -> FloatArray:
     """Farthest (n,) m that a place `end` m from the origin of the last link can be from each
-    axis.
+    axis that turns.
     """
-    links = np.linalg.norm(scene.chain.joint_origin[1:, :3, 3], axis=1)
+    first = scene.cell.robot.base + 1
+    links = np.linalg.norm(scene.chain.joint_origin[first:, :3, 3], axis=1)
     tail = np.append(links, end)
     return np.asarray(np.cumsum(tail[::-1])[::-1])
 
@@ -145,14 +143,19 @@ def tool_states(
     places = poses[:, 3, 1:]
     axis = _turned(rotation, scene.chain.joint_axis.T[:, :, None])
     rate = axis * np.ascontiguousarray(qd.T)
+    bend = axis * np.ascontiguousarray(qdd.T)
+    slide = np.zeros((2, 3, 1, 1))
+    if scene.chain.first_slides:  # moves the base, and turns nothing
+        slide = np.stack([rate[:, :1], bend[:, :1]])
+        rate[:, 0] = bend[:, 0] = 0.0
     turn = _after(rate)  # of the frame after each axis, (3, n, N)
     before = np.zeros_like(turn)
     before[:, 1:] = turn[:, :-1]
-    change = _after(axis * np.ascontiguousarray(qdd.T), _cross(before, rate))
+    change = _after(bend, _cross(before, rate))
     arm = places[:, 1:] - places[:, :-1]
     lift = _cross(turn[:, :-1], arm)
-    speed = _after(lift)[:, -1:]  # at the origin of the last one
-    gain = _after(_cross(change[:, :-1], arm), _cross(turn[:, :-1], lift))[:, -1:]
+    speed = _after(lift)[:, -1:] + slide[0]  # at the origin of the last one
+    gain = _after(_cross(change[:, :-1], arm), _cross(turn[:, :-1], lift))[:, -1:] + slide[1]
     turn = turn[:, -1:]
     change = change[:, -1:]
     swing = _length(turn)

@@ -76,9 +76,8 @@ def position_violation(
     k, j = (int(i) for i in beyond[0])
     reached = low[k, j] if robot.position_min[j] - low[k, j] > POSITION_SLACK else high[k, j]
     sentence = (
-        f"{robot.joint_names[j]} reaches {np.degrees(reached):.6g} deg after waypoint {k}: it "
-        f"must be in [{np.degrees(robot.position_min[j]):g}, "
-        f"{np.degrees(robot.position_max[j]):g}] deg (excess {np.degrees(excess[k, j]):.3g} deg)"
+        f"{robot.joint_names[j]} reaches {robot.shown(j, reached)} after waypoint {k}: it must be "
+        f"in {robot.shown_range(j)} (excess {robot.shown(j, excess[k, j], 3)})"
     )
     return Violation(float(trajectory.times[k]), k, "position", float(excess[k, j]), sentence)
 

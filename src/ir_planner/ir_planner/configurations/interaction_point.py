@@ -59,8 +59,15 @@ def searched_configurations(
     """Free configurations that bring the tcp to `pose` (4, 4), found from `starts` random starts.
 
     Ranked by W from `near` (n,), then by clearance; `reached` counts the starts that arrived.
+    Raises RequestError for a robot on a rail.
     """
     robot = scene.cell.robot
+    if robot.rail is not None:
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"coordinate descent turns joints, {robot.rail.name} slides: configurations on a rail "
+            "are those of the closed form (analytic)",
+        )
     rng = np.random.default_rng(seed)
     first = random_starts(
         robot.position_min, robot.position_max, starts, settings.distribution, rng
@@ -141,7 +148,7 @@ def configurations_at(
     threshold = context.at(goal.station).thresholds()
     with journal.stage("closed form" if journal.planner_id == "analytic" else "ccd") as notes:
         if journal.planner_id == "analytic":
-            found = free_configurations(goal.pose, scene, threshold, near)
+            found = free_configurations(goal.pose, scene, threshold, near, goal.rail)
         else:
             found = searched_configurations(
                 goal.pose, scene, threshold, near, starts, journal.seed, settings, context.work

@@ -20,6 +20,9 @@ from ir_planner.presentation import in_mm
 from ir_planner.scene import END_TOLERANCE, PlanningScene, movement_cost
 from ir_values.arrays import FloatArray, IntArray
 
+_RAIL_APART = 0.5  # m between places of a rail that count as different
+_DIFFERENT = 6  # configurations that searches look at
+
 
 @dataclass(frozen=True, eq=False)
 class Configurations:
@@ -39,12 +42,18 @@ class Configurations:
 
 
 def free_configurations(
-    pose: FloatArray, scene: PlanningScene, threshold: FloatArray, near: FloatArray
+    pose: FloatArray,
+    scene: PlanningScene,
+    threshold: FloatArray,
+    near: FloatArray,
+    rail: float | None = None,
 ) -> Configurations:
     """All configurations that bring the tcp to `pose` (4, 4) with every pair above its threshold
-    (Z,).
+    (Z,); on a rail those at the place `rail` [m], None: at places over its travel and at that of
+    near (n,).
     """
-    found = scene.inverse_kinematics.solve(np.asarray(pose)[None])
+    places = scene.rail_places(near) if rail is None else np.array([rail])
+    found = scene.inverse_kinematics_at(places).solve(np.asarray(pose)[None])
     rejected: Counter[str] = Counter()
     if len(found.q) == 0:
         return Configurations(found.q, found.branch, 0, rejected)
@@ -62,8 +71,29 @@ def free_configurations(
     branch = found.branch[free]
     margin = closest.distance[free]
     order = np.lexsort((-margin, np.round(movement_cost(scene.weights, near, q), 6)))
+    if len(places) > 1:
+        order = _varied(q[order], branch[order], order)
     nearest = "" if len(q) else _least_lacking(scene, closest, threshold)
     return Configurations(q[order], branch[order], len(found.q), rejected, nearest)
+
+
+def _varied(q: FloatArray, branch: IntArray, order: IntArray) -> IntArray:
+    """The order (K,) of configurations (K, 7), cheapest first, with different ones in front: other
+    places of the rail, or other branches of the arm. A search takes the first few, and what is
+    cheap by W on the rail need not be in joules.
+    """
+    first: list[int] = []
+    for k in range(len(order)):
+        apart = all(
+            abs(q[k, 0] - q[other, 0]) >= _RAIL_APART or branch[k] != branch[other]
+            for other in first
+        )
+        if apart:
+            first.append(k)
+        if len(first) == _DIFFERENT:
+            break
+    rest = np.setdiff1d(np.arange(len(order)), first)
+    return np.asarray(order[np.concatenate([np.array(first, np.int64), rest])])
 
 
 def _least_lacking(scene: PlanningScene, closest: MinDistance, threshold: FloatArray) -> str:

@@ -9,6 +9,8 @@ from ir_description.poses import abc_from_rotation, inverse, rotation_from_abc
 from ir_kernels import Chain, portable
 from ir_krl import KrlMotionError, SourcePlace
 from ir_krl.run import FRAME_NAMES, Effect, Note, Target
+from ir_msgs_py.status import StatusCode
+from ir_planner.errors import RequestError
 from ir_planner.scene import PlanningScene
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
@@ -86,12 +88,28 @@ def tool_in_flange(tcp: FloatArray) -> FloatArray:
     return np.asarray(portable.matmul(inverse(FLANGE), tcp))
 
 
+def check_no_rail(scene: PlanningScene) -> None:
+    """Raise RequestError for a robot on a rail."""
+    rail = scene.cell.robot.rail
+    if rail is not None:
+        raise RequestError(
+            StatusCode.INVALID_GOAL_CONSTRAINTS,
+            f"the robot is on the rail {rail.name}: programs of controllers are read and written "
+            "for arms without a rail only",
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """The robot in its cell, as motions need it; noted: hears what is assumed of a target."""
+    """The robot in its cell, as motions need it; noted: hears what is assumed of a target. Raises
+    RequestError for one on a rail.
+    """
 
     scene: PlanningScene
     noted: Callable[[Note], None] = lambda note: None
+
+    def __post_init__(self) -> None:
+        check_no_rail(self.scene)
 
     def flange(self, q: FloatArray) -> FloatArray:
         """KUKA's flange (N, 4, 4) in the robot's foot, of q (N, n)."""

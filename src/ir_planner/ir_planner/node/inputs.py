@@ -11,6 +11,7 @@ from sensor_msgs.msg import JointState
 
 from ir_description import Cell
 from ir_description.cell import CellPath
+from ir_description.robot import RAIL_LINK
 from ir_kernels import portable
 from ir_msgs_py.cartesian import POSES_MAX, CartesianPath, CartesianSegment
 from ir_msgs_py.names import BASE_FRAME
@@ -228,13 +229,18 @@ def states_of(messages: Sequence[Any], cell: Cell) -> FloatArray:
     return states
 
 
+def foot_frame(cell: Cell) -> str:
+    """The frame of the robot's foot that stands: base_link, on a rail that of the rail."""
+    return BASE_FRAME if cell.robot.rail is None else RAIL_LINK
+
+
 def pose_of(msg: Any, cell: Cell) -> FloatArray | None:
-    """Pose (4, 4) in the cell of a PoseStamped in the frame "cell" or "base_link", None where it is
-    not given.
+    """Pose (4, 4) in the cell of a PoseStamped in the frame "cell" or that of the robot's foot,
+    None where it is not given.
     """
     if not stamped_pose_given(msg):
         return None
-    return stamped_pose_from_msg(msg, {BASE_FRAME: cell.base_pose})
+    return stamped_pose_from_msg(msg, {foot_frame(cell): cell.base_pose})
 
 
 def goal_of(request: Any, cell: Cell) -> Goal:
@@ -388,8 +394,9 @@ def path_of(request: Any, cell: Cell) -> CartesianPath | CellPath:
         own = cell.own_path(request.path)
         changed = {name: getattr(request, name) for name in _FIELDS if _changed(request, name)}
         return replace(own, path=replace(own.path, **changed))
-    start = stamped_pose_from_msg(request.start_pose, {BASE_FRAME: cell.base_pose})
-    frame = cell.base_pose if request.start_pose.header.frame_id == BASE_FRAME else np.eye(4)
+    foot = foot_frame(cell)
+    start = stamped_pose_from_msg(request.start_pose, {foot: cell.base_pose})
+    frame = cell.base_pose if request.start_pose.header.frame_id == foot else np.eye(4)
     total = sum(len(segment.poses) for segment in request.segments)
     if total > POSES_MAX:
         raise RequestError(_CODE, f"segments have {total} poses: at most {POSES_MAX} are taken")

@@ -15,10 +15,11 @@ from ir_description import Body, Cell, Equipment
 from ir_description.cell import zone_around
 from ir_description.files.worlds import mesh_bodies
 from ir_description.poses import composed, inverse
-from ir_msgs_py.names import BASE_FRAME, WORLD_FRAME
+from ir_msgs_py.names import WORLD_FRAME
 from ir_msgs_py.ros.conversions import pose_from_msg
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
+from ir_planner.node.inputs import foot_frame
 from ir_planner.node.moveit_view import (
     PRIMITIVES,
     MoveItShape,
@@ -44,11 +45,12 @@ def refusal(what: str, must: str, code: StatusCode = StatusCode.INVALID_GOAL_CON
 
 def frame_pose(frame: str, cell: Cell, what: str) -> FloatArray:
     """Pose (4, 4) in the cell of a frame that a request names; "" is the planning frame."""
-    frames = {"": np.eye(4), WORLD_FRAME: np.eye(4), BASE_FRAME: cell.base_pose}
+    foot = foot_frame(cell)
+    frames = {"": np.eye(4), WORLD_FRAME: np.eye(4), foot: cell.base_pose}
     if frame not in frames:
         raise refusal(
             f"frame {shown(frame)} of {what}",
-            f"poses are taken in {WORLD_FRAME} (the planning frame) and {BASE_FRAME}",
+            f"poses are taken in {WORLD_FRAME} (the planning frame) and {foot}",
             StatusCode.FRAME_TRANSFORM_FAILURE,
         )
     return frames[frame]

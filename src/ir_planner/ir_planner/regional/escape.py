@@ -110,9 +110,8 @@ def _standing(start: FloatArray, scene: PlanningScene) -> FloatArray:
         j = int(np.argmax(np.where(np.isfinite(excess), excess, np.inf)))
         raise RequestError(
             StatusCode.START_STATE_INVALID,
-            f"start: {robot.joint_names[j]} is {np.degrees(q[j]):g} deg: a way out begins at most "
-            f"{np.degrees(OUTSIDE_MAX):.0f} deg beyond "
-            f"[{np.degrees(robot.position_min[j]):g}, {np.degrees(robot.position_max[j]):g}] deg",
+            f"start: {robot.joint_names[j]} is {robot.shown(j, q[j])}: a way out begins at most "
+            f"{robot.shown(j, OUTSIDE_MAX, 2)} beyond {robot.shown_range(j)}",
         )
     return q
 

@@ -157,24 +157,25 @@ def check_driveable(end: MovingEnd, context: Context) -> None:
     for j, name in enumerate(robot.joint_names):
         v = float(end.qd[j])
         a = float(end.qdd[j])
+        unit = "rad" if j >= robot.base else "m"
         bounds = (
-            (abs(v), limits.velocity[j], "velocity", "rad/s"),
-            (abs(a), limits.acceleration[j], "acceleration", "rad/s^2"),
+            (abs(v), limits.velocity[j], "velocity", f"{unit}/s"),
+            (abs(a), limits.acceleration[j], "acceleration", f"{unit}/s^2"),
         )
-        for value, bound, kind, unit in bounds:
+        for value, bound, kind, of_it in bounds:
             if not value <= bound * (1.0 + _SLACK):
                 raise _undriveable(
                     end,
-                    f"{name} has {kind} {value:.6g} {unit}: it must be at most {bound:.6g} {unit}, "
-                    f"exceeded by {value - bound:.3g} {unit}",
+                    f"{name} has {kind} {value:.6g} {of_it}: it must be at most {bound:.6g} "
+                    f"{of_it}, exceeded by {value - bound:.3g} {of_it}",
                 )
         rising = abs(v) + a * a / (2.0 * limits.jerk[j]) if a * v > 0.0 else 0.0
         if rising > limits.velocity[j] * (1.0 + _SLACK):
             raise _undriveable(
                 end,
-                f"{name} has velocity {abs(v):.6g} rad/s and acceleration {abs(a):.6g} rad/s^2, "
-                f"which falls with {limits.jerk[j]:g} rad/s^3: it reaches {rising:.6g} rad/s, it "
-                f"must be at most {limits.velocity[j]:.6g} rad/s",
+                f"{name} has velocity {abs(v):.6g} {unit}/s and acceleration {abs(a):.6g} "
+                f"{unit}/s^2, which falls with {limits.jerk[j]:g} {unit}/s^3: it reaches "
+                f"{rising:.6g} {unit}/s, it must be at most {limits.velocity[j]:.6g} {unit}/s",
             )
         for side, limit in ((1.0, robot.position_max[j]), (-1.0, robot.position_min[j])):
             needed = stopping_distance(
@@ -184,9 +185,9 @@ def check_driveable(end: MovingEnd, context: Context) -> None:
             if needed > left + _POSITION:
                 raise _undriveable(
                     end,
-                    f"{name} {turned} {np.degrees(needed):.4g} deg with {abs(v):.4g} rad/s, "
-                    f"however it brakes: {np.degrees(left):.4g} deg are left to its limit of "
-                    f"{np.degrees(limit):g} deg",
+                    f"{name} {turned} {robot.shown(j, needed, 4)} with {abs(v):.4g} {unit}/s, "
+                    f"however it brakes: {robot.shown(j, left, 4)} are left to its limit of "
+                    f"{robot.shown(j, limit)}",
                 )
     most = 1.0 - context.scene.drives.torque_reserve
     forwards = end.qd if end.what == "start" else -end.qd

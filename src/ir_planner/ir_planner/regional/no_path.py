@@ -225,10 +225,12 @@ class EndEnclosure:
 
 
 def enclosure(ends: Ends, space: FreeSpace) -> EndEnclosure | None:
-    """What proves that no path leads from the start to any of the goals; None: nothing is
-    proved.
+    """What proves that no path leads from the start to any of the goals; None: nothing is proved,
+    as ever on a rail, whose reach isn't followed.
     """
     scene = space.scene
+    if scene.chain.first_slides:
+        return None
     balls = _balls(space)
     kept = _kept(balls, space)
     bodies = [body for body in scene.cell.bodies() if np.isfinite(kept[body.name])]
@@ -368,6 +370,8 @@ def spreads(scene: PlanningScene) -> FloatArray:
         if pair.body_b not in capsules:
             continue
         near, far = sorted((capsules[pair.body_a], capsules[pair.body_b]), key=lambda c: c.link)
+        if near.link < robot.base:
+            continue
         between = set(range(near.link, far.link))
         turns = _turned(near, far, scene)
         for joint in between:

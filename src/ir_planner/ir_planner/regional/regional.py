@@ -302,7 +302,8 @@ def plan_to_goal(
     if goal.configuration is not None:
         return plan_to_configurations(start, goal.configuration[None], context, searches)
     assert goal.pose is not None  # a Goal has one of both
-    solutions = free_configurations(goal.pose, context.scene, context.thresholds(), start)
+    scene = context.scene
+    solutions = free_configurations(goal.pose, scene, context.thresholds(), start, goal.rail)
     if len(solutions.q) == 0:
         status = no_configuration(goal.pose, context.scene, solutions, goal.text or "goal")
         return MovementPlan(

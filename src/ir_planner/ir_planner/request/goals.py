@@ -1,7 +1,9 @@
 """Goals as people type them: a station, a posture, joint values in degrees, or a pose of the tcp.
 
 "lathe" | "park" | "home" | "A1 0 A2 -90 A3 90 A4 0 A5 0 A6 0" | "X 1.8 Y 0 Z 1.2 A 0 B 90 C 0" (m
-and degrees, KUKA's A, B, C: Z-Y'-X'').
+and degrees, KUKA's A, B, C: Z-Y'-X''). A robot on a rail takes "E1 2.5" [m] too: among its axes,
+and behind a pose or a station, where it says at which place of the rail; without it the planner
+chooses.
 """
 
 import math
@@ -32,13 +34,14 @@ _NO_ANGLE = 1e6  # rad
 @dataclass(frozen=True, eq=False)
 class Goal:
     """Exactly one of configuration (n,) rad and pose (4, 4) of the tcp in the cell; station: its
-    name, "" for none.
+    name, "" for none. rail: where [m] the rail is at the pose; None: anywhere.
     """
 
     configuration: FloatArray | None = None
     pose: FloatArray | None = None
     station: str = ""
     text: str = ""
+    rail: float | None = None
 
 
 def one_goal(
@@ -83,9 +86,10 @@ def parse_goal(text: str, cell: Cell, what: str = "goal") -> Goal:
             StatusCode.INVALID_GOAL_CONSTRAINTS,
             f"{what} has {len(text)} characters: it must be one line of 1 to 300",
         )
+    stripped, rail = _with_rail(stripped, cell, what)
     for station in cell.stations:
         if station.name == stripped:
-            return Goal(pose=station.pose, station=station.name, text=stripped)
+            return Goal(pose=station.pose, station=station.name, text=stripped, rail=rail)
     if stripped.lower() in POSTURES:
         return Goal(configuration=cell.posture(stripped.lower()), text=stripped.lower())
     words, keys = _words(stripped)
@@ -94,7 +98,8 @@ def parse_goal(text: str, cell: Cell, what: str = "goal") -> Goal:
         q = within_limits(joints, cell, what, StatusCode.GOAL_STATE_INVALID)
         return Goal(configuration=q, text=stripped)
     if len(words) > 1 and keys[0] in _POSE_KEYS:
-        return Goal(pose=_pose(_numbers(keys, words[1::2], list(_POSE_KEYS), "")), text=stripped)
+        pose = _pose(_numbers(keys, words[1::2], list(_POSE_KEYS), ""))
+        return Goal(pose=pose, text=stripped, rail=rail)
     texts = ('"A1 0 A2 -90 ..." in degrees', '"X 1.8 Y 0 Z 1.2 A 0 B 90 C 0"')
     raise unknown_name(what, stripped, [*(s.name for s in cell.stations), *POSTURES, *texts])
 
@@ -104,10 +109,28 @@ def joints_of(text: str, cell: Cell) -> FloatArray | None:
     Raises RequestError.
     """
     words, keys = _words(text)
-    joints = [f"A{i + 1}" for i in range(cell.robot.n)]
+    robot = cell.robot
+    joints = [robot.axis_label(i).upper() for i in range(robot.n)]
     if len(words) < 2 or keys[0] not in joints:
         return None
-    return np.asarray(np.radians(_numbers(keys, words[1::2], joints, "deg")))
+    return robot.from_people_units(np.array(_numbers(keys, words[1::2], joints, "deg")))
+
+
+def _with_rail(text: str, cell: Cell, what: str) -> tuple[str, float | None]:
+    """A text without "E1 2.5" at its end, and that place [m] of the rail; None: it gives none."""
+    robot = cell.robot
+    words = text.split()
+    if robot.rail is None or len(words) < 3 or words[-2].upper() != robot.rail.name.upper():
+        return text, None
+    label = robot.rail.name
+    place = _numbers([label], words[-1:], [label], "of m")[0]
+    if not robot.rail.low <= place <= robot.rail.high:
+        raise RequestError(
+            StatusCode.GOAL_STATE_INVALID,
+            f"{what}: {label} is {place:g} m: it must be in [{robot.rail.low:g}, "
+            f"{robot.rail.high:g}] m",
+        )
+    return " ".join(words[:-2]), place
 
 
 def _words(text: str) -> tuple[list[str], list[str]]:
@@ -158,11 +181,14 @@ def within_limits(q: ArrayLike, cell: Cell, what: str, code: StatusCode) -> Floa
             )
         excess = max(float(value) - high, low - float(value))
         if excess > LIMIT_TOLERANCE:
+            shown, beyond = (
+                robot.shown(i, size) if i < robot.base else _angle(size)
+                for size in (float(value), excess)
+            )
             raise RequestError(
                 code,
-                f"{what}: {robot.joint_names[i]} is {_angle(float(value))}: it must be in "
-                f"[{math.degrees(low):g}, {math.degrees(high):g}] deg, exceeded by "
-                f"{_angle(excess)}{_hint(code, excess)}",
+                f"{what}: {robot.joint_names[i]} is {shown}: it must be in "
+                f"{robot.shown_range(i)}, exceeded by {beyond}{_hint(code, excess)}",
             )
     return np.clip(q, robot.position_min, robot.position_max)
 

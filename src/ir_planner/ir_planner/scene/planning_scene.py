@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ir_description import (
     Cell,
@@ -24,6 +25,7 @@ from ir_description.cell import AllowedContact, Zone
 from ir_description.robot import LINK
 from ir_kernels import Chain, CollisionModel, DynamicsModel, inverse_kinematics
 from ir_kernels.ik_set import InverseKinematics
+from ir_kernels.inverse_kinematics import RailIk
 from ir_kernels.power import DcBusParameters, Regeneration
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.status import StatusCode
@@ -166,11 +168,31 @@ class PlanningScene:
             self.chain, self.cell.robot.position_min, self.cell.robot.position_max
         )
 
+    def inverse_kinematics_at(self, places: ArrayLike) -> InverseKinematics:
+        """The same with a rail at these places (P,) [m], which without a rail say nothing."""
+        everywhere = self.inverse_kinematics
+        return everywhere.with_places(places) if isinstance(everywhere, RailIk) else everywhere
+
+    def inverse_kinematics_beside(self, q: FloatArray) -> InverseKinematics:
+        """The same with a rail that stays where it is at q (n,)."""
+        return self.inverse_kinematics_at(q[:1])
+
+    def rail_places(self, near: FloatArray) -> FloatArray:
+        """Places (P,) [m] of the rail at which a pose is sought: evenly over its travel, and where
+        it is at near (n,); empty without a rail.
+        """
+        everywhere = self.inverse_kinematics
+        if not isinstance(everywhere, RailIk):
+            return np.zeros(0)
+        return np.unique(np.append(everywhere.places, near[0]))
+
     @cached_property
     def turning(self) -> BoolArray:
         """Axes (n,) that turn twice: a whole turn to both sides of 0."""
         robot = self.cell.robot
-        return np.asarray((robot.position_min <= -_TURN) & (robot.position_max >= _TURN))
+        twice = np.asarray((robot.position_min <= -_TURN) & (robot.position_max >= _TURN))
+        twice[: robot.base] = False
+        return twice
 
     @cached_property
     def inverse_kinematics_once(self) -> InverseKinematics:

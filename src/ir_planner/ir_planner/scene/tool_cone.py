@@ -78,18 +78,21 @@ class ToolCone:
         """On which straight movements (N, n) to (N, n) the tilt is proved to stay in the cone."""
         step = q1 - q0
         coefficients = np.stack([q0, step], axis=2)
-        bend = _bend(np.abs(step), np.zeros_like(step))
+        bend = self._bend(np.abs(step), np.zeros_like(step))
         return self._proof(coefficients, np.ones(len(q0)), bend, self.most + _EDGE).ok
 
     def proof(self, coefficients: FloatArray, durations: FloatArray) -> TiltProof:
         """Of a trajectory (S, n, K), (S,) s: whether every tilt stays in the cone."""
         return self._proof(
-            coefficients, durations, _bend_of(coefficients, durations), self.most + TILT_TOLERANCE
+            coefficients,
+            durations,
+            self._bend_of(coefficients, durations),
+            self.most + TILT_TOLERANCE,
         )
 
     def largest(self, coefficients: FloatArray, durations: FloatArray) -> float:
         """A bound [rad] of every tilt of a trajectory (S, n, K), (S,) s; inf: none is proved."""
-        bend = _bend_of(coefficients, durations)
+        bend = self._bend_of(coefficients, durations)
         level = float(self.tilts(coefficients[:, :, 0]).max()) + _TIGHT
         tight = _TIGHT
         for _ in range(_BOUNDS):
@@ -141,6 +144,21 @@ class ToolCone:
         step = (across * portable.solve(gram, wanted)).sum(axis=1) * cheap
         size = np.abs(step).max(axis=1)
         return np.asarray(step * np.minimum(1.0, _LONGEST / np.maximum(size, _LONGEST))[:, None])
+
+    def _bend_of(self, coefficients: FloatArray, durations: FloatArray) -> FloatArray:
+        found = extremes(coefficients, durations)
+        return self._bend(found.velocity, found.acceleration)
+
+    def _bend(self, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
+        """Bound (P,) of |u''| by the largest speeds and accelerations (P, n) of the joints; a rail
+        turns nothing.
+        """
+        first = int(self.chain.first_slides)
+        turning = speed[:, first:].sum(axis=1)
+        squares = turning * turning
+        # axes that are turned by those before
+        between = 0.5 * (squares - (speed[:, first:] * speed[:, first:]).sum(axis=1))
+        return np.asarray(squares + between + acceleration[:, first:].sum(axis=1))
 
     def _axis(self, q: FloatArray) -> FloatArray:
         """The axis (N, 3) in the cell at q (N, n)."""
@@ -241,16 +259,3 @@ def _at(coefficients: FloatArray, piece: IntArray, time: FloatArray) -> FloatArr
     for k in range(of.shape[2] - 2, -1, -1):
         value = value * time[:, None] + of[:, :, k]
     return np.asarray(value)
-
-
-def _bend_of(coefficients: FloatArray, durations: FloatArray) -> FloatArray:
-    found = extremes(coefficients, durations)
-    return _bend(found.velocity, found.acceleration)
-
-
-def _bend(speed: FloatArray, acceleration: FloatArray) -> FloatArray:
-    """Bound (P,) of |u''| by the largest speeds and accelerations (P, n) of the joints."""
-    turning = speed.sum(axis=1)
-    squares = turning * turning
-    between = 0.5 * (squares - (speed * speed).sum(axis=1))  # axes that are turned by those before
-    return np.asarray(squares + between + acceleration.sum(axis=1))

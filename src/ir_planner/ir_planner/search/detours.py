@@ -174,7 +174,7 @@ def free_retraction(q: FloatArray, space: FreeSpace, length: float, spacing: flo
     back = np.arange(1, round(length / spacing) + 1) * spacing
     poses = np.repeat(tcp[None], len(back), axis=0)
     poses[:, :3, 3] -= back[:, None] * tcp[:3, 0]
-    found = scene.inverse_kinematics.solve(poses)
+    found = scene.inverse_kinematics_beside(q).solve(poses)
     line = [q]
     for k in range(len(poses)):
         candidates = found.of_pose(k)

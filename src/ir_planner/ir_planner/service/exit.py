@@ -52,7 +52,8 @@ class WorkArea:
         ]
         bodies = machine.world_bodies()
         zone = machine.zone
-        inner = [capsule for capsule in capsules if capsule.link >= FIRST_LINK]
+        first = FIRST_LINK + scene.cell.robot.base
+        inner = [capsule for capsule in capsules if capsule.link >= first]
         box = Body("zone", "box", zone.pose, zone.size)
         return WorkArea(
             scene,

@@ -95,10 +95,16 @@ def service_lines(
     """Lines of the context's station from interaction configurations (K, n); those that leave the
     limits or change branch are counted and dropped.
     """
-    poses = line_poses(context.scene.station(context.station))
-    found = context.scene.inverse_kinematics.solve(poses)
+    scene = context.scene
+    poses = line_poses(scene.station(context.station))
+    by_place = {
+        float(place): scene.inverse_kinematics_at([place]).solve(poses)
+        for place in np.unique(interaction[:, : scene.cell.robot.base])
+    }
+    everywhere = None if by_place else scene.inverse_kinematics.solve(poses)
     lines = []
     for q in interaction:
+        found = by_place[float(q[0])] if everywhere is None else everywhere
         points = [q]
         for k in range(1, len(poses)):
             candidates = found.of_pose(k)

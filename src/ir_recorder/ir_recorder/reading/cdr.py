@@ -36,6 +36,7 @@ _VALUE = 32  # bytes that a value counts beside its path
 MOST_COMPARED = 1 << 30  # bytes of lengths that are compared, and beyond these
 MOST_PASSES = 20  # times the bytes of the messages
 _LENGTH = struct.Struct("<I")
+AXES_MAX = 16  # of a robot with its external axes
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +148,14 @@ class Columns:
                 used = min(width, leaf.count)
                 out[rows, :used] = values[:, :used]
         return out
+
+    def by_axis(self, path: str, least: int) -> FloatArray:
+        """A numeric array with a value per axis as (N, n): n is the longest one of up to AXES_MAX,
+        `least` at least; missing values are NaN.
+        """
+        leaves = (layout.leaves.get(path) for _, _, layout in self._groups)
+        longest = max((leaf.count for leaf in leaves if leaf is not None), default=0)
+        return self.numbers(path, max(least, min(longest, AXES_MAX)))
 
     def integers(self, path: str) -> IntArray:
         """A whole-number field as (N,); 0 where it is missing. Raises ReadError for another one."""

@@ -337,11 +337,11 @@ class _SeriesReader:
             columns.numbers("base_power"),
             columns.numbers("bus_voltage"),
             columns.numbers("burnt_power"),
-            columns.numbers("joint_power", len(names.JOINT_NAMES)),
-            columns.numbers("joint_torque", len(names.JOINT_NAMES)),
+            columns.by_axis("joint_power", len(names.JOINT_NAMES)),
+            columns.by_axis("joint_torque", len(names.JOINT_NAMES)),
             columns.numbers("tool_power"),
             columns.numbers("rectifier_loss"),
-            columns.numbers("joint_temperature", len(names.JOINT_NAMES)),
+            columns.by_axis("joint_temperature", len(names.JOINT_NAMES)),
             self._seconds(channel.log_time),
             next((name for name in reversed(columns.texts("plant")) if name), ""),
         )
@@ -353,7 +353,7 @@ class _SeriesReader:
             columns.numbers("path_time"),
             columns.numbers("speed_scaling"),
             columns.numbers("tool_deviation"),
-            columns.numbers("error.positions", len(names.JOINT_NAMES)),
+            columns.by_axis("error.positions", len(names.JOINT_NAMES)),
         )
 
     def _bits(

@@ -332,21 +332,26 @@ class ContactScene:
         with what stands around, those of the wrist among themselves, and all others.
         """
         n = len(self.reach)
+        base = self.cell.robot.base
+        upper_arm = _UPPER_ARM + base
+        forearm = _FOREARM + base
         link = {capsule.name: capsule.link for capsule in self.capsules}
         outer = np.array([max(link[a], link.get(b, 0)) for _, a, b in self.model.pairs], dtype=int)
         inner = np.array([min(link[a], link.get(b, 0)) for _, a, b in self.model.pairs], dtype=int)
-        wrist = inner >= _FOREARM
-        near = (inner == 0) & (outer <= _UPPER_ARM)
+        wrist = inner >= forearm
+        near = (inner == 0) & (outer <= upper_arm)
         joints = np.arange(n)
         return (
-            (near, self._reach_of(_ends(c for c in self.capsules if c.link <= _UPPER_ARM))),
-            (wrist, np.where(joints >= _FOREARM, self.reach, 0.0)),
+            (near, self._reach_of(_ends(c for c in self.capsules if c.link <= upper_arm))),
+            (wrist, np.where(joints >= forearm, self.reach, 0.0)),
             (~near & ~wrist, self.reach),
         )
 
     @cached_property
     def reach(self) -> FloatArray:
-        """(n,): how far from each joint's axis anything that it moves can be [m]."""
+        """(n,): how far from each joint's axis anything that it moves can be [m]; of a rail 1, as
+        it moves all by its own motion.
+        """
         return self._reach_of(_ends(self.capsules))
 
     def _reach_of(self, points: Iterable[tuple[int, float]]) -> FloatArray:
@@ -358,6 +363,7 @@ class ContactScene:
             for joint in range(link - 1, -1, -1):
                 result[joint] = max(result[joint], far)
                 far += float(offsets[joint])
+        result[: robot.base] = 1.0
         return result
 
     def contacts(self, stop: str) -> tuple[AllowedContact, ...]:

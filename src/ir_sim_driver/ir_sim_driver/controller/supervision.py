@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ir_description import RobotModel
+from ir_msgs_py.names import joint_unit
 from ir_sim_driver.motion import ErrorCode
 from ir_sim_driver.plant import Backend
 from ir_values.arrays import FloatArray
@@ -167,10 +168,11 @@ class Supervision:
         robot = self._robot
         beyond = np.maximum(q - robot.position_max, robot.position_min - q)
         j = int(beyond.argmax())
+        unit = joint_unit(robot.joint_names[j])
         return Fault(
-            f"{robot.joint_names[j]} is at {q[j]:.4f} rad: its range is "
-            f"[{robot.position_min[j]:.4f}, {robot.position_max[j]:.4f}] rad, exceeded by "
-            f"{beyond[j]:.3g} rad"
+            f"{robot.joint_names[j]} is at {q[j]:.4f} {unit}: its range is "
+            f"[{robot.position_min[j]:.4f}, {robot.position_max[j]:.4f}] {unit}, exceeded by "
+            f"{beyond[j]:.3g} {unit}"
         )
 
     def _left_tube(self, q: FloatArray, command: CommandedPosition) -> Fault | None:
@@ -182,7 +184,8 @@ class Supervision:
         tube = command.tube * 1e3
         return Fault(
             f"the tool is {off:.2f} mm from its command: at most {tube:g} mm; "
-            f"worst is {self._robot.joint_names[j]} with {error[j]:+.6f} rad",
+            f"worst is {self._robot.joint_names[j]} with {error[j]:+.6f} "
+            f"{joint_unit(self._robot.joint_names[j])}",
         )
 
     def _too_fast(self, qd: FloatArray) -> Fault | None:
@@ -208,4 +211,5 @@ class Supervision:
     def _worst(self, verb: str, value: FloatArray, limit: FloatArray, unit: str) -> Fault:
         j = int((np.abs(value) / limit).argmax())
         name = self._robot.joint_names[j]
+        unit = joint_unit(name, unit)
         return Fault(f"{name} {verb} {value[j]:.4g} {unit}: its limit is {limit[j]:.4g} {unit}")

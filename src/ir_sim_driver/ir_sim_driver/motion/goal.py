@@ -11,6 +11,7 @@ import numpy as np
 
 from ir_description.robot import LIMIT_TOLERANCE
 from ir_msgs_py.announcements import Contact
+from ir_msgs_py.names import joint_unit
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.load_check import LoadFinding
 from ir_values.arrays import FloatArray
@@ -165,6 +166,7 @@ def _worst(names: Sequence[str], error: FloatArray, bound: FloatArray, what: str
     if (size <= bound).all():
         return ""
     j = int((size - bound).argmax())
+    unit = joint_unit(names[j], unit)
     return (
         f"{names[j]} {what} error is {error[j]:+.6f} {unit}: the tolerance is {bound[j]:g} {unit}"
     )

@@ -13,6 +13,7 @@ from ir_description import RobotModel
 from ir_description.robot import OUTSIDE_MAX
 from ir_kernels.dynamics import DynamicsModel
 from ir_kernels.limits import Extrema, polynomial_extrema
+from ir_msgs_py.names import joint_unit
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.corner_rounding import SHARES, SLOWEST, is_rounded, rounded
@@ -121,7 +122,8 @@ def _position_excess(
     ):
         if at is not None:
             time, k, j = at
-            sentence = _sentence(names[j], "is at", values[k, j], float(bounds[j]), time, "rad")
+            unit = joint_unit(names[j])
+            sentence = _sentence(names[j], "is at", values[k, j], float(bounds[j]), time, unit)
             candidates.append(_Excess(time, sentence))
     return min(candidates, default=None)
 
@@ -141,6 +143,7 @@ def _excess(
     if at is None:
         return None
     time, k, j = at
+    unit = joint_unit(names[j], unit)
     return _Excess(time, _sentence(names[j], "needs", value[k, j], float(limit[j]), time, unit))
 
 
@@ -345,22 +348,25 @@ def _check_start(
 ) -> None:
     delta = trajectory.positions[0] - now.q
     j = int(np.abs(delta).argmax())
+    name = trajectory.joint_names[j]
+    unit = joint_unit(name)
     if abs(delta[j]) > settings.start_tolerance:
         raise TrajectoryRefusedError(
             ErrorCode.INVALID_GOAL,
-            f"{trajectory.joint_names[j]} starts at {trajectory.positions[0, j]:.6f} rad, "
-            f"{delta[j]:+.6f} rad from the commanded {now.q[j]:.6f} rad: at most "
-            f"{settings.start_tolerance:g} rad (or a first time above 0 s)",
+            f"{name} starts at {trajectory.positions[0, j]:.6f} {unit}, "
+            f"{delta[j]:+.6f} {unit} from the commanded {now.q[j]:.6f} {unit}: at most "
+            f"{settings.start_tolerance:g} {unit} (or a first time above 0 s)",
         )
     jump = _motion_at_point(trajectory, 0).qd - now.qd
     over = np.abs(jump) - settings.blend_time * acceleration_max
     j = int(over.argmax())
     if over[j] > 0.0:
+        name = trajectory.joint_names[j]
+        unit = joint_unit(name, "rad/s")
         raise TrajectoryRefusedError(
             ErrorCode.INVALID_GOAL,
-            f"{trajectory.joint_names[j]} starts with {jump[j]:+.4f} rad/s against the command: "
-            "at most "
-            f"{settings.blend_time * acceleration_max[j]:.4f} rad/s (or a first time above 0 s)",
+            f"{name} starts with {jump[j]:+.4f} {unit} against the command: at most "
+            f"{settings.blend_time * acceleration_max[j]:.4f} {unit} (or a first time above 0 s)",
         )
 
 
@@ -530,9 +536,11 @@ def _check_points(
         low = allowed.low[j]
         high = allowed.high[j]
         excess = max(q[k, j] - high, low - q[k, j])
+        name = trajectory.joint_names[j]
+        unit = joint_unit(name)
         raise _invalid(
-            f"point {k} joint {j} ({trajectory.joint_names[j]}) is at {q[k, j]:.6f} rad: the "
-            f"limits are [{low:.6f}, {high:.6f}] rad, exceeded by {excess:.3g} rad"
+            f"point {k} joint {j} ({name}) is at {q[k, j]:.6f} {unit}: the "
+            f"limits are [{low:.6f}, {high:.6f}] {unit}, exceeded by {excess:.3g} {unit}"
         )
 
 
@@ -561,9 +569,11 @@ def _check_end(trajectory: JointTrajectory) -> None:
     last = trajectory.velocities[-1]
     j = int(np.abs(last).argmax())
     if abs(last[j]) > AT_REST:
+        name = trajectory.joint_names[j]
+        unit = joint_unit(name, "rad/s")
         raise _invalid(
-            f"point {len(trajectory.times_ns) - 1} joint {j} ({trajectory.joint_names[j]}) ends "
-            f"with {last[j]:g} rad/s: the last velocity must be 0 rad/s"
+            f"point {len(trajectory.times_ns) - 1} joint {j} ({name}) ends with {last[j]:g} "
+            f"{unit}: the last velocity must be 0 {unit}"
         )
 
 

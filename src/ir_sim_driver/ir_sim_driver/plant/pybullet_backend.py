@@ -32,7 +32,8 @@ _THICKNESS = 1e-6  # share of the largest principal moment; a thousand times fin
 
 class PhysicsBody(NamedTuple):
     """A link: mass [kg], centre (3,) [m] and principal moments (3,) [kg m^2] about it in its frame,
-    whose pose in that of the link before is pose (4, 4); it turns about axis (3,).
+    whose pose in that of the link before is pose (4, 4); it turns about axis (3,), on a rail the
+    first slides along it.
     """
 
     mass: float
@@ -71,9 +72,10 @@ def urdf_of(robot: RobotModel, bodies: Sequence[PhysicsBody]) -> str:
     parts = [_link(0, 1.0, np.zeros(3), np.ones(3))]
     for i, body in enumerate(bodies):
         parts.append(_link(i + 1, body.mass, body.com, body.moments))
+        kind = "prismatic" if i < robot.base else "revolute"
+        origin = _origin(body.pose[:3, 3], _rpy(body.pose[:3, :3]))
         parts.append(
-            f'<joint name="{i + 1}" '
-            f'type="revolute">{_origin(body.pose[:3, 3], _rpy(body.pose[:3, :3]))}'
+            f'<joint name="{i + 1}" type="{kind}">{origin}'
             f'<parent link="{i}"/><child link="{i + 1}"/><axis xyz="{_row(body.axis)}"/>'
             f'<limit lower="{low[i]!r}" upper="{high[i]!r}" velocity="0" effort="0"/></joint>'
         )
