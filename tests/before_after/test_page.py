@@ -18,7 +18,8 @@ from ir_cli.main import main
 from ir_msgs_py.savings import BeforeAfter, Saving
 from ir_planner import Planner
 from ir_recorder.analysis.production import home_watts
-from ir_recorder.report.costs import J_PER_KWH, Costs, money
+from ir_recorder.report.costs import J_PER_KWH, Costs
+from ir_recorder.report.money_text import money
 from ir_recorder.report.motion_scene import common_rests, in_step
 from ir_recorder.report.number_text import (
     kilograms,

@@ -13,7 +13,8 @@ from ir_planner.before_after import before_after_common
 from ir_recorder import analyse, findings, read_recording
 from ir_recorder.analysis.production import production_of
 from ir_recorder.report import report_html
-from ir_recorder.report.costs import Costs, yearly_money
+from ir_recorder.report.costs import Costs
+from ir_recorder.report.money_text import yearly_money
 from ir_recorder.report.program_comparison import before_after_html, year_of
 
 STATIONS = ("p1", "p2", "home")

@@ -34,15 +34,12 @@ from ir_recorder.report.costs import (
     counted_with,
     idle_saving,
     lever_section,
-    money,
     payback,
     read_costs,
     recorded_idle_saving,
-    together,
-    yearly_money,
-    yearly_span,
 )
 from ir_recorder.report.fleet import fleet_html, fleet_of_line, member_of
+from ir_recorder.report.money_text import money, together, yearly_money, yearly_span
 from ir_recorder.report.number_text import kilograms, kilowatt_hours
 from ir_recorder.report.paid import with_span
 from ir_values.settings import settings_table

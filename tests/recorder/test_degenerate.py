@@ -21,8 +21,8 @@ from ir_recorder.analysis.production import production_of
 from ir_recorder.reading.recording import Recording
 from ir_recorder.report import report_html
 from ir_recorder.report.compare import comparison_html
-from ir_recorder.report.costs import money
 from ir_recorder.report.fleet import fleet_html, member_of
+from ir_recorder.report.money_text import money
 from ir_recorder.report.number_text import joules, kilowatt_hours, millimetres, number, watts
 
 LACKING = (

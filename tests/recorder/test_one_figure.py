@@ -26,8 +26,9 @@ from ir_recorder.analysis.production import levers, production_of
 from ir_recorder.analysis.results import FullPause
 from ir_recorder.report import report_html
 from ir_recorder.report.compare import comparison_html
-from ir_recorder.report.costs import J_PER_KWH, Costs, money
+from ir_recorder.report.costs import J_PER_KWH, Costs
 from ir_recorder.report.fleet import by_mode, fleet_columns, fleet_html, member_of, robots_of
+from ir_recorder.report.money_text import money
 from ir_recorder.report.number_text import kilowatt_hours, yearly_kilowatt_hours
 
 PAUSES = ("", "600 s, 1800 s", "5 s, 7 s", "60 s")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass, field
+from dataclasses import astuple, dataclass, field, replace
 
 import numpy as np
 
@@ -45,6 +45,10 @@ class Saving:
         """
         return Saving(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
 
+    def divided(self, count: float) -> Saving:
+        """That of one of so many equal parts."""
+        return Saving(*(value / count for value in astuple(self)))
+
     @property
     def change(self) -> str:
         """The share in words: "44.5 % less", "2.8 % more"."""
@@ -72,6 +76,17 @@ class ProgramSavings:
     def total(self) -> Saving:
         """Movements and pauses."""
         return self.movements.plus(self.pauses)
+
+    def of_part(self, count: float) -> ProgramSavings:
+        """Those of one of `count` equal parts of the program."""
+        if count == 1.0:
+            return self
+        return replace(
+            self,
+            movements=self.movements.divided(count),
+            pauses=self.pauses.divided(count),
+            common_seconds=self.common_seconds / count,
+        )
 
 
 @dataclass(frozen=True)

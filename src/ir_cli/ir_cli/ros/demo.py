@@ -30,7 +30,8 @@ from ir_msgs_py import names
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement
 from ir_msgs_py.ros.client import Client, ProgramAnswer
-from ir_msgs_py.savings import one_sided
+from ir_msgs_py.ros.plan_conversions import program_savings_to_msg
+from ir_msgs_py.savings import ProgramSavings, one_sided
 from ir_msgs_py.wake_on_lan import magic_packet, send_packet
 from ir_planner import Goal, Planner
 from ir_program_runner.settings import LinkSettings
@@ -267,6 +268,7 @@ class Demonstration:
         self._progress = progress
         full = load_cell(cell)
         self._steps: tuple[PlannedMovement, ...] = ()
+        self._saves = ProgramSavings()
         if full.route is not None and not full.program:
             real_pauses = True
             full, self._steps = self._tending(full, tended or Tended(), seed)
@@ -293,6 +295,8 @@ class Demonstration:
         if plan.run is None or plan.run_cell is None:
             raise CommandError(plan.status.message)
         self._progress.end(repr(plan))
+        if plan.program is not None and plan.cycle is not None:
+            self._saves = plan.program.savings.of_part(plan.cycle.units)
         planner.set_cell(plan.run_cell)
         first = plan.run.movements[0]
         assert first.trajectory is not None
@@ -369,7 +373,9 @@ class Demonstration:
         return ""
 
     def _tend(self, client: Client) -> str:
-        """Drive the run; why that ended early."""
+        """Drive the run, which saves what its plan does; why that ended early."""
+        if self._saves.available:
+            client.publish(f"/{names.PROGRAM_SAVINGS}", program_savings_to_msg(self._saves))
         try:
             self._drive(client, self._steps)
         except (CommandError, IrError) as error:
@@ -387,6 +393,8 @@ class Demonstration:
             contents.SAFETY_DISTANCE: f"{self._options.safety_distance:g} m",
             **{name: f"{seconds:g} s" for name, seconds in self._transitions.items()},
         }
+        if self._saves.common_seconds > 0.0:
+            facts[contents.COMMON_SECONDS] = f"{self._saves.common_seconds!r} s"
         if self._full_pauses:
             facts[contents.UNSHORTENED_PAUSES] = ", ".join(
                 f"{seconds:g} s" for seconds in self._full_pauses

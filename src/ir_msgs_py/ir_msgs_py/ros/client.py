@@ -53,7 +53,7 @@ from ir_msgs_py.ros.plan_conversions import (
 )
 from ir_msgs_py.ros.search_conversions import searches_from_msg
 from ir_msgs_py.ros.spinning import BackgroundExecutor, Cancellation
-from ir_msgs_py.ros.topics import ACTION_SERVICES, SERVICE
+from ir_msgs_py.ros.topics import ACTION_SERVICES, LATCHED, SERVICE
 from ir_msgs_py.savings import ProgramPoint, ProgramSavings
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
@@ -491,6 +491,12 @@ class Client:
         qos = self.graph.qos_of_publishers(topic)
         self._executor.run(
             lambda: self.node.create_subscription(message_type, topic, callback, qos)
+        )
+
+    def publish(self, topic: str, message: Any) -> None:
+        """Publish a message that subscribers get who come later, as long as the client lives."""
+        self._executor.run(
+            lambda: self.node.create_publisher(type(message), topic, LATCHED).publish(message)
         )
 
     def next_message(self, topic: str, message_type: Any, timeout: float | None = None) -> Any:

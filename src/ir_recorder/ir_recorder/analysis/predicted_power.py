@@ -173,8 +173,13 @@ class Predictor:
         return self._energies(standing_sample(q, loads, self._parameters.modes))
 
     def added_at_rest(self, mode: str, q: FloatArray, loads: Sequence[Load]) -> FloatArray:
-        """W (N,) that the drawn robots add to the power of standing at q (n,) in a mode."""
-        return self._added(standing_sample(q, loads, self._parameters.modes, mode))[1]
+        """W (N,) that the drawn robots add to the power of standing at q (n,) in a mode: linear
+        around the mean, as the planner's pauses, so that a saving has one interval.
+        """
+        samples = standing_sample(q, loads, self._parameters.modes, mode)
+        mean = self._parameters.mean
+        _, slopes = self._model.watts_and_slopes(mean, self._model.prepare(samples))
+        return np.asarray(samples.step * ((self._draws - mean) @ slopes.sum(axis=0)))
 
     def _energies(self, samples: Samples) -> tuple[float, float, float]:
         """Energy [J] of samples, and the ends of its 90 % interval."""

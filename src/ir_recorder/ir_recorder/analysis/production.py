@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import astuple, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.savings import ProgramSavings, Saving
 from ir_recorder.analysis.flows import EnergyFlows, energy_flows
 from ir_recorder.analysis.loads import carried
+from ir_recorder.analysis.meter import Meter
 from ir_recorder.analysis.predicted_power import (
     BRAKES,
     Predictor,
@@ -236,6 +237,7 @@ def _driven(analysis: Analysis, program: ProgramTotals) -> Production | None:
         full = None
     elif full is not None:
         name = "cycle with full pauses, computed from this run and the data"
+    savings = _full_savings(analysis.savings, full)
     energy = (full.energy if full is not None else whole.energy) / cycles
     seconds = (full.seconds if full is not None else whole.seconds) / cycles
     return Production(
@@ -248,20 +250,9 @@ def _driven(analysis: Analysis, program: ProgramTotals) -> Production | None:
         cycles,
         _modes(analysis, full, seconds, energy, cycles, _all_of(analysis)),
         _steps(analysis, full, cycles, _all_of(analysis)),
-        _of_a_cycle(_full_savings(analysis.savings, full), cycles / programs),
+        savings.of_part(cycles / programs) if savings is not None else None,
         tuple(notes),
     )
-
-
-def _of_a_cycle(savings: ProgramSavings | None, count: float) -> ProgramSavings | None:
-    """Savings of a program of so many cycles as those of one."""
-    if savings is None or count == 1.0:
-        return savings
-    movements, pauses = (
-        Saving(*(value / count for value in astuple(part)))
-        for part in (savings.movements, savings.pauses)
-    )
-    return replace(savings, movements=movements, pauses=pauses)
 
 
 def _cycles_of_program(recording: Recording) -> int:
@@ -276,7 +267,7 @@ def _tended(analysis: Analysis, tending: Tending, whole: Share, notes: Sequence[
     count = len(parts)
     seconds = sum(part.span.seconds for part in parts) / count
     energy = sum(part.joules for part in parts) / count
-    time = Span(parts[0].span.begin, parts[-1].span.end)
+    time = _counted(analysis)
     filled = "with the line full" if tending.steady else "while the line was filled"
     mean = "the part" if count == 1 else f"mean of {count} parts"
     return Production(
@@ -289,13 +280,22 @@ def _tended(analysis: Analysis, tending: Tending, whole: Share, notes: Sequence[
         whole.seconds / seconds,
         _modes(analysis, None, seconds, energy, count, time),
         _steps(analysis, None, count, time),
-        notes=tuple(notes),
+        analysis.savings if tending.steady else None,
+        tuple(notes),
     )
 
 
 def _all_of(analysis: Analysis) -> Span:
     """The time of the program."""
     return Span(analysis.steps[0].step.start, analysis.steps[-1].step.end)
+
+
+def _counted(analysis: Analysis) -> Span:
+    """The time of the cycles that the mean cycle is of: of a route while the line was full."""
+    if analysis.tending is None:
+        return _all_of(analysis)
+    parts = analysis.tending.steady or analysis.tending.parts
+    return Span(parts[0].span.begin, parts[-1].span.end)
 
 
 def _modes(
@@ -399,10 +399,11 @@ def driven_and_predicted(analysis: Analysis) -> tuple[float, float]:
 def demand_watts(analysis: Analysis, cycle: Production) -> float:
     """The largest mean power [W] of a quarter of an hour of cycles, one after the other.
 
-    The steps draw their mean power, in their order; a cycle that fits a quarter of an hour often
-    has little more than its mean.
+    The steps and the waits between them draw their mean power, in their order. They are those that
+    the cycle is the mean of, so no cycle takes more on average; one that fits a quarter of an hour
+    often has little more than its mean.
     """
-    rows = _in_order(analysis)
+    rows = stretches(analysis)
     seconds = np.array([time for time, _ in rows])
     joules = np.array([energy for _, energy in rows])
     if not len(rows) or seconds.sum() <= 0.0 or not np.isfinite(joules).all():
@@ -424,20 +425,32 @@ def largest_quarter(seconds: FloatArray, joules: FloatArray) -> float:
     return float(found.max() / QUARTER)
 
 
-def _in_order(analysis: Analysis) -> list[tuple[float, float]]:
-    """Seconds and joules of the steps of one cycle, pauses at full length."""
+def stretches(analysis: Analysis) -> list[tuple[float, float]]:
+    """Seconds and joules of the steps of all cycles that production counts, and of the waits
+    between them, in their order; pauses at full length.
+    """
+    power = analysis.recording.power
     if analysis.program is None:
         return [(step.duration, step.report.energy) for step in analysis.recording.planned]
+    if power is None or len(power.time) < 2:
+        return []
+    span = _counted(analysis)
+    meter = Meter(power)
     longer = {pause.step: pause for pause in _added(analysis.program)}
     rows = []
-    for place, result in enumerate(analysis.steps[: analysis.steps[0].step.total]):
-        seconds = result.seconds
-        energy = result.energy
-        if place in longer:
-            seconds += longer[place].seconds
-            energy += longer[place].energy
-        rows.append((seconds, energy))
-    return rows
+    turn = span.begin
+    for place, result in enumerate(analysis.steps):
+        start = max(result.step.start, turn)
+        end = min(result.step.end, span.end)
+        if end <= start:
+            continue
+        rows.append((start - turn, meter.energy(turn, start)))
+        pause = longer.get(place)
+        more = (pause.seconds, pause.energy) if pause is not None else (0.0, 0.0)
+        rows.append((end - start + more[0], meter.energy(start, end) + more[1]))
+        turn = end
+    rows.append((span.end - turn, meter.energy(turn, span.end)))
+    return [row for row in rows if row[0] > 0.0]
 
 
 def idle_watts(analysis: Analysis) -> dict[str, float]:

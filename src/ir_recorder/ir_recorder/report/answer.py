@@ -7,32 +7,51 @@ from dataclasses import dataclass
 
 from ir_recorder.report.number_text import text
 
+Said = str | Sequence[str]
+
 
 @dataclass(frozen=True)
 class Answer:
-    """What a page says first: the result in a few large words and a sentence, how sure it is, what
-    to do (in words, or several with the first first), and what a part and a night cost; "" and ()
-    where there is nothing to say.
+    """What a page says first: the result in a few large words and a sentence, its 90 % interval in
+    words, how sure it is, what to do (in words, or several with the first first), and what a part
+    and a night cost; "" and () where there is nothing to say. reached: what was saved already, of
+    which `do` is not; counted: what the amounts rest on (HTML).
     """
 
     result: str
     words: str
-    sure: str = ""
-    do: str | Sequence[str] = ""
+    sure: Said = ""
+    do: Said = ""
     costs: Sequence[str] = ()
+    between: str = ""
+    reached: Sequence[str] = ()
+    counted: str = ""
 
     def html(self) -> str:
         """As the first section of a page."""
-        parts = [f"<div><h2>Result</h2><b>{text(self.result)}</b><p>{text(self.words)}</p></div>"]
-        for head, words in (("How sure", self.sure), ("What to do", self.do)):
-            if words:
-                parts.append(f"<div><h2>{head}</h2>{_said(words)}</div>")
+        between = f'<p class="between">{text(self.between)}</p>' if self.between else ""
+        words = f"<p>{text(self.words)}</p>" if self.words else ""
+        parts = [
+            f'<div class="result"><h2>Result</h2><b>{text(self.result)}</b>{between}{words}</div>'
+        ]
+        left = "Still to save" if self.reached else "What to do"
+        todo = ""
+        for head, said in (("Reached: keep driving it", self.reached), (left, self.do)):
+            if said:
+                todo += f"<h2>{head}</h2>{_said(said, 'ol')}"
+        if todo:
+            parts.append(f'<div class="do">{todo}</div>')
+        if self.sure:
+            parts.append(f'<div class="sure"><h2>How sure</h2>{_said(self.sure, "ul")}</div>')
         if self.costs:
-            parts.append(f"<div><h2>What energy costs</h2>{''.join(map(_said, self.costs))}</div>")
+            costs = _said(self.costs, "ul")
+            parts.append(f'<div class="costs"><h2>What energy costs</h2>{costs}</div>')
+        if self.counted:
+            parts.append(f'<p class="counted">{self.counted}</p>')
         return f'<section id="answer">{"".join(parts)}</section>\n'
 
 
-def _said(words: str | Sequence[str]) -> str:
+def _said(words: Said, kind: str) -> str:
     if isinstance(words, str):
         return f"<p>{text(words)}</p>"
-    return f"<ol>{''.join(f'<li>{text(each)}</li>' for each in words)}</ol>"
+    return f"<{kind}>{''.join(f'<li>{text(each)}</li>' for each in words)}</{kind}>"

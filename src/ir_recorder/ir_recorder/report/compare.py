@@ -33,13 +33,13 @@ from ir_recorder.report.costs import (
     IdleSaving,
     assumed_section,
     counted_with,
+    following_price,
     recorded_idle_saving,
     saved_year,
-    yearly_money,
-    yearly_span,
 )
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import checked, plant_of
+from ir_recorder.report.money_text import yearly_money, yearly_span
 from ir_recorder.report.number_text import (
     DASH,
     joules,
@@ -52,13 +52,14 @@ from ir_recorder.report.number_text import (
     watts,
 )
 from ir_recorder.report.page import PAGE_START, asset
+from ir_recorder.report.paid import a_night, counted_at, first_steps
 from ir_recorder.report.series import Curves, Json, packed, stretches
 from ir_recorder.report.shell import badge, shell
 from ir_recorder.report.tables import COMPACT, table
 from ir_values.files import ANYWHERE, FileRoots
 
 MOST = 12  # recordings on one page: more columns than that are not read
-SCRIPTS = ("charts.js", "axes.js", "export.js", "compare.js")
+SCRIPTS = ("charts.js", "axes.js", "export.js", "price.js", "compare.js")
 _POINTS = 4000  # of a power curve
 Compared = tuple[Analysis, Sequence[Finding]]
 
@@ -81,7 +82,7 @@ def comparison_html(compared: Sequence[Compared], costs: Costs | None = None) ->
         "end": _longest(analyses),
         "axes": [_powers(analyses, names)] if _longest(analyses) else [],
     }
-    prices = costs or Costs()
+    prices = following_price(costs or Costs())
     parts = {
         "problems": _problems(analyses, names),
         "paid": _paid(compared, names, prices),
@@ -143,23 +144,32 @@ def _answer(analyses: Sequence[Analysis], names: Sequence[str], costs: Costs) ->
     said = [f"{name} {yearly_money(known[name].value, costs.currency)}" for name in names[:_NAMED]]
     words = f"A year in shifts: {', '.join(said)}."
     intervals = [
-        f"{name} {yearly_span(year.low, year.high)} {costs.currency}"
+        f"{name} {yearly_span(year.low, year.high, costs.currency)} {costs.currency}"
         for name, year in list(known.items())[:_NAMED]
         if year.low < year.high
     ]
-    sure = "One run each: a year of it has no interval."
+    sure = ["A run that was driven once has no interval."]
     if intervals:
-        sure = f"90 % intervals: {', '.join(intervals)}; a run that was driven has none."
+        sure.insert(0, f"90 % intervals: {', '.join(intervals)}.")
+    do = []
     if least == names[0] and all(year.low > first.high for year in list(known.values())[1:]):
         result = f"{least} costs least"
-        return Answer(result, words, sure, f"Keep {least}.")
-    if known[least].high < first.low:
+        do.append(f"Keep {least}.")
+    elif known[least].high < first.low:
         less = yearly_money(first.value - known[least].value, costs.currency)
-        return Answer(f"{least}: {less} less a year", words, sure, f"Drive {least}.")
-    if len(names) == _BESIDE and analyses[0].program is not analyses[1].program is None:
-        return Answer("The plan predicts the run", words, sure, "Nothing: both cost alike.")
-    result = f"None is shown to cost less than {names[0]}"
-    return Answer(result, words, sure, "Choose by time, peak or clearance: Runs in figures.")
+        result = f"{least}: {less} less a year"
+        do.append(f"Drive {least}.")
+    elif len(names) == _BESIDE and analyses[0].program is not analyses[1].program is None:
+        result = "The plan predicts the run"
+        do.append("In shifts: nothing, both cost alike.")
+    else:
+        result = f"None is shown to cost less than {names[0]}"
+        do.append("In shifts: choose by time, peak or clearance (Runs in figures).")
+    idle = recorded_idle_saving(analyses[0], costs)
+    if idle is not None:
+        do += first_steps((), idle, costs)
+        sure.append(f"What nights save is {idle.basis}.")
+    return Answer(result, words, sure, do, a_night(idle, costs), counted=counted_at(costs))
 
 
 _NAMED = 4  # recordings in a sentence
@@ -272,7 +282,7 @@ def _year_saved(cycle: Production | None, costs: Costs) -> str:
         cycle.supply,
     ]
     if price.high > price.low:
-        lines.insert(0, f"{yearly_span(price.low, price.high)} {costs.currency}")
+        lines.insert(0, f"{yearly_span(price.low, price.high, costs.currency)} {costs.currency}")
     small = "".join(f"<small>{text(line)}</small>" for line in lines if line)
     return f"<b>{text(yearly_money(price.value, costs.currency))}</b>{small}"
 
@@ -314,7 +324,11 @@ def _both(amount: Amount, idle: IdleSaving, costs: Costs) -> str:
     year = saved_year(amount, idle, costs)
     word, gain = year.money.gain()
     price = yearly_money(year.money.value, costs.currency)
-    between = f"{yearly_span(gain.low, gain.high)} {costs.currency}" if gain.low < gain.high else ""
+    between = (
+        f"{yearly_span(gain.low, gain.high, costs.currency)} {costs.currency}"
+        if gain.low < gain.high
+        else ""
+    )
     energy = year.with_energy(costs)
     more = f"{energy} more" if word == "more" and energy else energy
     lines = (between, more)

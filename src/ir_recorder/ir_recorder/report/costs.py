@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeGuard
@@ -26,6 +25,17 @@ from ir_recorder.analysis.production import (
     saved_amount,
 )
 from ir_recorder.errors import RecorderError
+from ir_recorder.report.money_text import (
+    NEXT_TO_NOTHING,
+    NOTHING,
+    UNSEEN,
+    Repriced,
+    hours_of,
+    money,
+    price_of,
+    yearly_money,
+    yearly_span,
+)
 from ir_recorder.report.number_text import (
     DASH,
     kilograms,
@@ -47,6 +57,12 @@ from ir_values.settings import Setting, check_settings, describe, setting
 # What joules cost, from a file or as assumed: prices by day and night and of the peak, the calendar
 # of shifts, and the grid's CO2.
 
+TODAY = "today's program"
+COMMON = "common program"
+PLANNED = "planned program"
+"""The programs that are compared, on every page by the same name: today's, what stands for it where
+nobody gave it, and the planner's.
+"""
 FORMAT = "ir_costs/1"
 _CURRENCY_MAX = 12  # characters
 J_PER_KWH = 3.6e6
@@ -159,6 +175,11 @@ class Costs:
             )
 
     @property
+    def follows_price(self) -> bool:
+        """Whether a page shows its amounts at the price that its reader types."""
+        return isinstance(self.currency, Repriced)
+
+    @property
     def line(self) -> dict[str, float]:
         """Shares [%] of the energy of a line with its hall, by consumer."""
         return {
@@ -238,6 +259,15 @@ class Costs:
             return None
         total = cycle.savings.total
         return saved_amount(total).times(self.cycles_per_year(total.seconds or cycle.seconds))
+
+
+def following_price(costs: Costs) -> Costs:
+    """The same, whose amounts a page shows at the price that its reader types; as they are where
+    the night has a price of its own, and amounts are in proportion to none.
+    """
+    if costs.price_night > 0.0 or costs.price <= 0.0:
+        return costs
+    return replace(costs, currency=Repriced(costs.currency))
 
 
 SETTINGS: tuple[Setting, ...] = tuple(each for each in describe(Costs) if each.name != "given")
@@ -332,7 +362,8 @@ def _waits(cycle: Production, costs: Costs) -> str:
         return f"; the common program would need {more / 3600.0:.0f} h more for them"
     if seconds(cycle.pace) == seconds(cycle.seconds):
         return ""
-    return f" as in the common program (this cycle takes {seconds(cycle.seconds)})"
+    sooner = seconds(cycle.pace - cycle.seconds)
+    return f" as in the common program; this cycle ends {sooner} sooner"
 
 
 def _bridge(analysis: Analysis, cycle: Production) -> str:
@@ -376,15 +407,15 @@ def _before(cycle: Production, costs: Costs, driven: bool) -> list[tuple[str, ..
     total = cycle.savings.total
     pace = total.seconds or cycle.seconds
     alone = cycle.savings.common_seconds or pace
-    rows = [_cycle_row("common program, predicted", alone, total.common, pace, costs)]
+    rows = [_cycle_row(f"{COMMON}, predicted", alone, total.common, pace, costs)]
     if driven:
-        row = _cycle_row("planned program, predicted", pace, total.planned, pace, costs)
+        row = _cycle_row(f"{PLANNED}, predicted", pace, total.planned, pace, costs)
         rows.append(row)
     return rows
 
 
 def _row(cycle: Production, costs: Costs) -> tuple[str, ...]:
-    return _cycle_row(cycle.name, cycle.seconds, cycle.energy, cycle.pace, costs)
+    return _cycle_row(cycle.name, cycle.pace, cycle.energy, cycle.pace, costs)
 
 
 def _cycle_row(
@@ -409,24 +440,9 @@ def _shown(value: float, year: float, currency: str) -> str:
     """An amount of a part, a shift or a year; in words where it, or the whole year, is too little
     to count.
     """
-    if 0.0 < abs(value) < _UNSEEN or 0.0 < abs(year) < _NOTHING:
-        return "practically nothing"
+    if 0.0 < abs(value) < UNSEEN or 0.0 < abs(year) < NOTHING:
+        return NEXT_TO_NOTHING
     return money(value, currency)
-
-
-def money(value: float, currency: str) -> str:
-    """An amount with its currency; small ones with three significant digits, tiny ones with
-    two.
-    """
-    if not math.isfinite(value):
-        return DASH
-    if abs(value) >= _NO_CENTS:
-        shown = whole(value)
-    elif abs(value) >= 1.0:
-        shown = f"{value:.2f}"
-    else:
-        shown = significant(value, 3 if abs(value) >= 0.001 else 2)
-    return f"{shown} {currency}"
 
 
 def money_of_thousand(energy: float, costs: Costs) -> str:
@@ -434,62 +450,13 @@ def money_of_thousand(energy: float, costs: Costs) -> str:
     return f"{money(1000.0 * costs.money(energy), costs.currency)} for 1 000"
 
 
-_NO_CENTS = 10.0  # of a currency: no cents from here on
-_NOTHING = 0.01  # of a currency, a year: nobody counts less
-_UNSEEN = 1e-4  # of a currency, a part or a shift
-
-
-def yearly_money(value: float, currency: str) -> str:
-    """An amount of a year; in words where it is below a hundredth of the currency."""
-    if 0.0 < abs(value) < _NOTHING:
-        return "practically nothing"
-    return f"{value:.2f} {currency}" if abs(value) < 1.0 else money(value, currency)
-
-
-def money_of(amount: Amount, currency: str) -> str:
-    """An amount of a year that stands beside its interval: whole where the ends are."""
-    if amount.low < amount.high and max(abs(amount.low), abs(amount.high)) >= _NO_CENTS:
-        return f"{whole(amount.value)} {currency}"
-    return yearly_money(amount.value, currency)
-
-
-def together(amounts: Sequence[float]) -> float:
-    """The sum of amounts of a year as they are shown, each rounded: it adds up on the page."""
-    return sum(_rounded(each) for each in amounts)
-
-
-def _rounded(value: float) -> float:
-    if not math.isfinite(value):
-        return value
-    return round(value, 0 if abs(value) >= _NO_CENTS else 2)
-
-
-def yearly_span(low: float, high: float) -> str:
-    """The ends of an amount of a year, without its currency."""
-    return _span_of_money(low, high, _NOTHING)
-
-
-def _span_of_money(low: float, high: float, least: float) -> str:
-    """Two ends of one interval: both whole where one is shown so; 0 for one below `least`."""
-    no_cents = max(abs(low), abs(high)) >= _NO_CENTS
-
-    def show(value: float) -> str:
-        if no_cents:
-            return whole(value)
-        if abs(value) < least:
-            return "0"
-        return f"{value:.2f}" if least == _NOTHING else money(value, "").strip()
-
-    return span_of(low, high, show)
-
-
 def payback(money: Amount, costs: Costs) -> str:
     """How many hours of an engineer a saving of a year pays for; "" where it is open whether
     anything is saved, or next to nothing is.
     """
-    if money.doubt or money.value < _NOTHING or costs.engineer_hour <= 0.0:
+    if money.doubt or money.value < NOTHING or costs.engineer_hour <= 0.0:
         return ""
-    hours = significant(money.value / costs.engineer_hour, 2)
+    hours = hours_of(money.value, costs.engineer_hour, costs.currency)
     hour = f"{costs.engineer_hour:g} {costs.currency}/h"
     return f"worth it within a year where it takes less than {hours} h of an engineer ({hour})"
 
@@ -525,8 +492,10 @@ def _saving(where: str, saving: Saving, pace: float, costs: Costs) -> tuple[str,
         price = amount.times(count).of(costs.money)
         shown = _shown(price.value, year, costs.currency)
         between = ""
-        if abs(year) >= _NOTHING and price.high > price.low:
-            between = f"<small>{text(_span_of_money(price.low, price.high, _UNSEEN))}</small>"
+        if abs(year) >= NOTHING and price.high > price.low:
+            between = (
+                f"<small>{text(yearly_span(price.low, price.high, costs.currency, UNSEEN))}</small>"
+            )
         cells.append(f"<b>{text(shown)}</b>{between}")
     return (f"{word} {where}", *cells)
 
@@ -539,15 +508,6 @@ def small_span(amount: Amount, show: Callable[[float], str]) -> str:
 
 
 # What the amounts rest on: a sentence where they stand, and all settings as a table.
-
-
-def assumed_prices(costs: Costs) -> str:
-    """The price and the shifts that a year is counted with, in a few words."""
-    own = {"price", "shift_hours", "shifts_per_day", "days_per_year"} <= set(costs.given)
-    return (
-        f"At {_setting(costs, 'price')}, {costs.shifts_per_day:g} x {costs.shift_hours:g} h on "
-        f"{costs.days_per_year:g} days a year{'' if own else ', assumed'}"
-    )
 
 
 def counted_with(costs: Costs) -> str:
@@ -611,12 +571,14 @@ def assumed_section(costs: Costs) -> str:
     )
 
 
-_MONEY_PER = {"price": "/kWh", "price_night": "/kWh", "demand_price": "/kW", "engineer_hour": "/h"}
+_MONEY_PER = {"price_night": "/kWh", "demand_price": "/kW", "engineer_hour": "/h"}
 
 
 def _setting(costs: Costs, name: str) -> str:
     """A setting with its unit."""
     value = getattr(costs, name)
+    if name == "price":
+        return price_of(value, costs.currency)
     if name in _MONEY_PER:
         return f"{value:g} {costs.currency}{_MONEY_PER[name]}"
     unit = next(each.unit for each in SETTINGS if each.name == name)
@@ -645,7 +607,7 @@ def lever_section(analysis: Analysis, costs: Costs) -> str:
     idle = None if known else recorded_idle_saving(analysis, costs)
     if idle is not None:
         words = f"{idle.mode} instead of brakes that are only closed, {idle.basis}"
-        ends = f"{yearly_span(idle.money.low, idle.money.high)} {costs.currency}"
+        ends = f"{yearly_span(idle.money.low, idle.money.high, costs.currency)} {costs.currency}"
         words += f", 90 % interval {ends}" if idle.money.low < idle.money.high else ""
         name = f"at night and at weekends<small>{text(words)}</small>"
         rows.append((idle.saved, name, DASH))
@@ -682,16 +644,17 @@ def clock_section(analysis: Analysis, costs: Costs) -> str:
 def _demand(analysis: Analysis, cycle: Production, costs: Costs) -> str:
     """The largest quarter of an hour, and its price where one is given."""
     peak = demand_watts(analysis, cycle)
-    price = f", {demand_money(peak, costs)}"
+    price = demand_note(peak, costs)
+    words = f", {price}" if price else "; demand_price gives it a price"
     limit = f" ({cycle.supply})" if cycle.supply else ""
-    return f"The largest quarter of an hour takes {watts(peak)} on average{limit}{text(price)}."
+    return f"The largest quarter of an hour takes {watts(peak)} on average{limit}{text(words)}."
 
 
-def demand_money(peak: float, costs: Costs) -> str:
-    """What the largest quarter of an hour [W] costs a year, where its price is given."""
+def demand_note(peak: float, costs: Costs) -> str:
+    """What the largest quarter of an hour [W] costs a year; "" where its price isn't given."""
     if costs.demand_price <= 0.0:
-        return "demand price not given"
-    return f"{money(peak / 1000.0 * costs.demand_price, costs.currency)} a year"
+        return ""
+    return f"{money(peak / 1000.0 * costs.demand_price, str(costs.currency))} a year"
 
 
 LEFT_ALONE = "STAND_ON_BRAKES"
@@ -788,7 +751,7 @@ def idle_saving(
     found = IdleSaving(
         HIBERNATION.lower(), *rests, saves, costs.idle_hours, costs.idle_price, measured
     )
-    return found if found.saved >= _NOTHING else None
+    return found if found.saved >= NOTHING else None
 
 
 def recorded_idle_saving(analysis: Analysis, costs: Costs) -> IdleSaving | None:

@@ -55,7 +55,8 @@ def page_data(analysis: Analysis, safety_distance: float) -> str:
 def page_content(analysis: Analysis, safety_distance: float) -> dict[str, Json]:
     """What the charts and the picture in 3D show of a recording, or of its plan."""
     return {
-        "end": analysis.recording.duration,
+        "end": _last(analysis),
+        "shown": _shown(analysis),
         "power": _power(analysis),
         "lanes": list(_lanes(analysis)),
         "clearance": [
@@ -71,6 +72,30 @@ def page_content(analysis: Analysis, safety_distance: float) -> dict[str, Json]:
         "blamed": [] if analysis.cell is None else blamed(analysis.cell, analysis.problems),
         **_planned(analysis),
     }
+
+
+def _last(analysis: Analysis) -> float:
+    """When there is nothing more to see [s]: a recording lasts until its file is closed."""
+    recording = analysis.recording
+    ends = [result.step.end for result in analysis.steps[-1:]]
+    ends += [
+        s.time[-1] for s in (recording.power, recording.joints) if s is not None and len(s.time)
+    ]
+    return min(float(max(ends, default=recording.duration)) + _AFTER, recording.duration)
+
+
+def _shown(analysis: Analysis) -> list[Json] | None:
+    """The part of the time that charts show first [s]: the program, where one was driven."""
+    if not analysis.steps:
+        return None
+    begin = analysis.steps[0].step.start
+    end = analysis.steps[-1].step.end
+    around = _AROUND * (end - begin)
+    return [max(begin - around, 0.0), min(end + around, _last(analysis))]
+
+
+_AFTER = 0.5  # s shown after the last reading
+_AROUND = 0.02  # of the program's time, before and after it
 
 
 def _number(value: float) -> float | None:

@@ -34,25 +34,24 @@ from ir_recorder.format.contents import is_further_part
 from ir_recorder.reading.reader import read_recording
 from ir_recorder.report.answer import Answer
 from ir_recorder.report.costs import (
+    COMMON,
     LEFT_ALONE,
     Costs,
     IdleSaving,
     assumed_section,
     counted_with,
-    demand_money,
+    demand_note,
+    following_price,
     idle_money,
     idle_saving,
     idle_sentence,
-    money_of,
     money_of_thousand,
     payback,
-    together,
-    yearly_money,
-    yearly_span,
 )
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import started
 from ir_recorder.report.methods import counted
+from ir_recorder.report.money_text import money_of, sum_of_money, yearly_money, yearly_span
 from ir_recorder.report.number_text import (
     DASH,
     ENGLISH,
@@ -66,7 +65,18 @@ from ir_recorder.report.number_text import (
     yearly_kilowatt_hours,
 )
 from ir_recorder.report.page import PAGE_START, folded
-from ir_recorder.report.paid import Paid, Tile, at_night, row_of, with_span
+from ir_recorder.report.paid import (
+    Paid,
+    Tile,
+    a_night,
+    at_night,
+    between_of,
+    counted_at,
+    percent_of,
+    reached_of,
+    row_of,
+    with_span,
+)
 from ir_recorder.report.shell import badge, shell
 from ir_recorder.report.step_table import TableValue, write_columns
 from ir_recorder.report.tables import COMPACT, bar, table
@@ -278,6 +288,11 @@ class Robot:
     saved: Amount | None
     drives_only: bool = False
 
+    @property
+    def driven(self) -> bool:
+        """Whether all of its files are of runs, none of a plan that nobody drove."""
+        return PREDICTED not in self.origins
+
 
 def robots_of(members: Sequence[Member], costs: Costs) -> list[Robot]:
     """The robots, those that take most first. Several recordings of a robot (shifts) are
@@ -409,7 +424,7 @@ def fleet_html(
     members: Sequence[Member], left_out: Sequence[str] = (), costs: Costs | None = None
 ) -> str:
     """The page as text; left_out: a sentence for each file that could not be used."""
-    prices = costs or Costs()
+    prices = following_price(costs or Costs())
     robots = robots_of(members, prices)
     known = at_mains(members)
     summed = [robot for robot in robots if not robot.drives_only]
@@ -461,9 +476,10 @@ def _answer(paid: Paid, robots: Sequence[Robot], costs: Costs) -> Answer:
         return Answer(
             f"{yearly_money(price.value, costs.currency)} a year",
             f"for the energy of {counted(len(summed), 'robot')} in shifts: {taken}.",
-            _sure(price, costs),
-            "Plan their programs (ir plan CELL --saving -o plan.mcap) and name these files as "
+            between=between_of(price, costs),
+            do="Plan their programs (ir plan CELL --saving -o plan.mcap) and name these files as "
             "well: no recording says what a plan saves.",
+            counted=counted_at(costs),
         )
     year = paid.year(costs)
     word, gain = year.money.gain()
@@ -472,43 +488,63 @@ def _answer(paid: Paid, robots: Sequence[Robot], costs: Costs) -> Answer:
     result = f"{yearly_money(gain.value, costs.currency)} a year {less} than {than}"
     if paid.saved is not None and paid.saved.doubt:
         result = f"Open whether anything is saved: {result}"
+    reached = paid.has_reached
+    if reached is not None:
+        of = yearly_money(gain.value, costs.currency)
+        result = f"{reached_of(reached.of(costs.money), of, costs)} a year reached"
     saved = year.with_energy(costs)
-    nights = 0.0 if paid.idle is None else paid.idle.left_alone
-    today = together((costs.money(paid.common), nights))
+    before = paid.before_amounts(costs)
+    share = (
+        f"{percent_of(gain.value, sum(before))} of the {sum_of_money(before, costs.currency)} of "
+        f"{paid.before}"
+    )
     parts = [
-        f"of {counted(len(summed), 'robot')} together",
+        f"{counted(len(summed), 'robot')} together",
+        share if paid.saved is not None and sum(before) > 0.0 else "",
         f"{saved} {less}" if saved else "",
-        f"{100.0 * gain.value / today:.1f} % of {yearly_money(today, costs.currency)}"
-        if paid.saved is not None and today > 0.0
-        else "",
         payback(year.money, costs),
     ]
-    words = ", ".join(part for part in parts if part)
-    return Answer(result, f"{words}.", paid.sure(costs), _steps(paid, robots, costs))
+    words = "; ".join(part for part in parts if part)
+    todo, done = _steps(paid, robots, costs)
+    return Answer(
+        result,
+        f"{words}.",
+        paid.sure(costs),
+        todo or ["Keep the programs as they are."],
+        a_night(paid.idle, costs),
+        between_of(gain, costs),
+        done,
+        counted_at(costs),
+    )
 
 
-def _sure(price: Amount, costs: Costs) -> str:
-    between = yearly_span(price.low, price.high)
-    return f"90 % interval {between} {costs.currency}." if price.low < price.high else ""
-
-
-def _steps(paid: Paid, robots: Sequence[Robot], costs: Costs) -> list[str]:
-    """What to do, what saves most first."""
+def _steps(paid: Paid, robots: Sequence[Robot], costs: Costs) -> tuple[list[str], list[str]]:
+    """What is to do, what saves most first; and what was done already."""
     found: list[tuple[float, str]] = []
     if paid.idle is not None:
         price = with_span(paid.idle.money, costs)
         words = f"All together in {at_night(paid.idle)}: {price} a year."
         found.append((paid.idle.saved, words))
-    if paid.saved is not None and paid.saved.value > 0.0 and not paid.saved.doubt:
-        saved = paid.saved.of(costs.money)
-        words = f"{_plans(robots)}: {with_span(saved, costs)} a year."
-        found.append((saved.value, words))
-    return [words for _, words in sorted(found, reverse=True)] or ["Keep the programs as they are."]
+    done = []
+    for driven in (True, False):
+        own = [robot for robot in robots if robot.driven == driven]
+        gains = [robot.saved for robot in own if robot.saved is not None and not robot.drives_only]
+        if not gains or paid.saved is None or paid.saved.doubt:
+            continue
+        saved = sum_of(gains).of(costs.money)
+        if saved.value <= 0.0:
+            continue
+        words = f"{_plans(own)}: {with_span(saved, costs)} a year."
+        if driven:
+            done.append(words)
+        else:
+            found.append((saved.value, words))
+    return [words for _, words in sorted(found, reverse=True)], done
 
 
 def _plans(robots: Sequence[Robot]) -> str:
-    """Whose plans to drive: those of robots that save, the one that saves most first; keep on where
-    all were driven already.
+    """Whose plans to drive: those of robots that save, the one that saves most first; whose were
+    driven, where all were.
     """
     known = [robot for robot in robots if not robot.drives_only]
     gains = {robot: robot.saved.value for robot in known if robot.saved is not None}
@@ -517,8 +553,8 @@ def _plans(robots: Sequence[Robot]) -> str:
         of = f"the plan of {saving[0].name} instead of its common program"
     else:
         of = f"the plans, that of {saving[0].name} first, instead of common programs"
-    driven = all(PREDICTED not in robot.origins for robot in saving)
-    return f"Go on driving {of}, as recorded" if driven else f"Drive {of}"
+    driven = all(robot.driven for robot in saving)
+    return f"{of[0].upper()}{of[1:]}" if driven else f"Drive {of}"
 
 
 def _badge(paid: Paid, costs: Costs) -> str:
@@ -552,7 +588,7 @@ def _tiles(
     costs_tile = Tile(
         "costs in shifts a year",
         yearly_money(price.value, costs.currency),
-        (_sure(price, costs).rstrip("."), energy, of),
+        (between_of(price, costs), energy, of),
     )
     peak = sum(_demand(members, robot) for robot in summed)
     demand = Tile(
@@ -561,7 +597,7 @@ def _tiles(
         (
             "in shifts, as if all robots' largest came at once",
             _outside(paid.idle),
-            demand_money(peak, costs),
+            demand_note(peak, costs),
         ),
     )
     return [costs_tile, demand]
@@ -600,7 +636,9 @@ def _paid(members: Sequence[Member], costs: Costs) -> Paid:
         of += f", {_names(without)} alike in all: no file says what its plan saves"
     unplanned = sum(robot.yearly.value for robot in without)
     recorded = (f"these files, {_as_made(members)}", sum_of([r.yearly for r in robots]).value)
-    return Paid(saved, common + unplanned, idle, of, "common programs", recorded)
+    driven = [robot.saved for robot in robots if robot.driven and robot.saved is not None]
+    reached = sum_of(driven) if driven else None
+    return Paid(saved, common + unplanned, idle, of, f"{COMMON}s", recorded, reached=reached)
 
 
 _ROBOT_HEADS = (
@@ -830,7 +868,8 @@ def _money(price: Amount, costs: Costs) -> str:
 def _small_ends(price: Amount, costs: Costs) -> str:
     if price.low >= price.high:
         return ""
-    return f"<small>{text(yearly_span(price.low, price.high))} {text(costs.currency)}</small>"
+    ends = yearly_span(price.low, price.high, costs.currency)
+    return f"<small>{text(ends)} {text(costs.currency)}</small>"
 
 
 def _saved(amount: Amount | None, costs: Costs) -> str:
@@ -923,7 +962,7 @@ def _night(
         return []
     own = {robot.name: _idle_saving(_own(members, robot), costs) for robot in robots}
     energies = {name: idle.energy.value for name, idle in own.items() if idle is not None}
-    ends = f"{yearly_span(nights.money.low, nights.money.high)} {costs.currency}"
+    ends = f"{yearly_span(nights.money.low, nights.money.high, costs.currency)} {costs.currency}"
     basis = f"{nights.mode} instead of closed brakes, {nights.basis}, 90 % interval {ends}"
     name = f"at night and at weekends<small>{text(basis)}</small>"
     return [(nights.saved, name, energies)]

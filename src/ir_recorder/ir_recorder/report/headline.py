@@ -25,17 +25,18 @@ from ir_recorder.format.contents import OWN_FACTS, VERSION
 from ir_recorder.reading.recording import Recording
 from ir_recorder.report.answer import Answer
 from ir_recorder.report.costs import (
+    COMMON,
     NAMES,
+    PLANNED,
     Costs,
     IdleSaving,
     cycles_of_year,
-    demand_money,
+    demand_note,
     money_of_thousand,
     recorded_idle_saving,
-    yearly_money,
-    yearly_span,
 )
 from ir_recorder.report.methods import counted
+from ir_recorder.report.money_text import sum_of_money, yearly_money
 from ir_recorder.report.number_text import (
     DASH,
     interval,
@@ -51,7 +52,16 @@ from ir_recorder.report.number_text import (
     text,
     watts,
 )
-from ir_recorder.report.paid import COMMON, MOVEMENTS, PAUSES, Paid, Tile, a_night, first_steps
+from ir_recorder.report.paid import (
+    MOVEMENTS,
+    PAUSES,
+    Paid,
+    Tile,
+    a_night,
+    between_of,
+    counted_at,
+    first_steps,
+)
 
 _STYLES = {Verdict.HOLDS: "good", Verdict.FAILS: "bad", Verdict.NOT_CHECKED: "open"}
 
@@ -189,7 +199,7 @@ def _demand(analysis: Analysis, cycle: Production, costs: Costs) -> Tile:
     return Tile(
         "largest quarter of an hour",
         watts(peak),
-        (cycle.origin, demand_money(peak, costs), cycle.supply),
+        (demand_note(peak, costs), cycle.origin, cycle.supply),
     )
 
 
@@ -218,7 +228,8 @@ def answer(analysis: Analysis, costs: Costs) -> str:
         return ""
     paid = _paid(analysis, costs)
     if cycle.savings is None:
-        return _without_saving(analysis, cycle, paid, costs).html()
+        shown = _without_saving(analysis, cycle, paid, costs).html()
+        return shown + paid.picture(costs)
     total = cycle.savings.total
     count = costs.cycles_per_year(total.seconds or cycle.seconds)
     steps = [
@@ -236,7 +247,6 @@ def answer(analysis: Analysis, costs: Costs) -> str:
 def _without_saving(analysis: Analysis, cycle: Production, paid: Paid, costs: Costs) -> Answer:
     """What a year costs, where nobody knows what a plan saves of it."""
     energy = costs.energy_of_year(cycle)
-    price = energy.of(costs.money)
     taken = f"{kilowatt_hours(energy.value)}, {kilograms(costs.co2(energy.value))} CO2"
     count = costs.cycles_per_year(cycle.pace)
     steps = [
@@ -255,33 +265,45 @@ def _without_saving(analysis: Analysis, cycle: Production, paid: Paid, costs: Co
         beside = (
             f"A part takes {kilowatt_hours(cycle.energy)}, as predicted {kilowatt_hours(planned)}."
         )
-    between = f"90 % interval {yearly_span(price.low, price.high)} {costs.currency}."
     name = f"{cycle.name[0].upper()}{cycle.name[1:]}"
     origin = f"{name}." if cycle.origin in cycle.name else f"{name}, {cycle.origin}."
-    nights = "" if paid.idle is None else f" Outside of them {_outside(paid.idle, costs)}."
+    limit = f"{cycle.supply[0].upper()}{cycle.supply[1:]}." if cycle.supply else ""
     return Answer(
-        f"{yearly_money(price.value, costs.currency)} a year in shifts",
-        f"{taken}; {cycles_of_year(cycle.pace, costs)}.{nights}",
-        " ".join(
-            each
-            for each in (between if price.low < price.high else "", origin, beside, cycle.supply)
-            if each
-        ),
+        *year_in_words(energy, paid.idle, taken, costs),
+        [each for each in (origin, beside, limit, _nights_rest_on(paid.idle)) if each],
         do,
         [f"Parts: {part}", *a_night(paid.idle, costs)],
+        between_of(energy.of(costs.money), costs),
+        counted=counted_at(costs),
     )
 
 
 NO_COMPARISON = (
     "No comparison in this file: ir plan CELL --saving -o FILE or ir compare CELL holds it against "
-    "today's program, and counts as many cycles a year as that makes"
+    "the common program, and counts as many cycles a year as that makes"
 )
 
 
-def _outside(idle: IdleSaving, costs: Costs) -> str:
-    """What rest outside of the shifts costs a year, at least and at most."""
-    ends = yearly_span(idle.deepest, idle.left_alone)
-    return f"{ends} {costs.currency}: {idle.mode} or brakes only"
+def year_in_words(
+    energy: Amount, idle: IdleSaving | None, taken: str, costs: Costs
+) -> tuple[str, str]:
+    """What a year of energy [J] in shifts costs, nights and weekends with it where they are known:
+    in a few words, and its parts.
+    """
+    shifts = costs.money(energy.value)
+    if idle is None:
+        nights = "Nights and weekends aren't known" if costs.idle_hours > 0.0 else "No nights"
+        return f"{yearly_money(shifts, costs.currency)} a year", f"In shifts: {taken}. {nights}."
+    outside = yearly_money(idle.left_alone, costs.currency)
+    return (
+        f"{sum_of_money((shifts, idle.left_alone), costs.currency)} a year",
+        f"{yearly_money(shifts, costs.currency)} in shifts ({taken}), {outside} at night and at "
+        "weekends, on closed brakes.",
+    )
+
+
+def _nights_rest_on(idle: IdleSaving | None) -> str:
+    return "" if idle is None else f"Nights and weekends: {idle.basis}."
 
 
 def _paid(analysis: Analysis, costs: Costs) -> Paid:
@@ -290,26 +312,29 @@ def _paid(analysis: Analysis, costs: Costs) -> Paid:
     if cycle is not None:
         idle = recorded_idle_saving(analysis, costs)
     saved = costs.saving_of_year(cycle) if cycle is not None else None
+    driven = None
+    if cycle is not None:
+        name = PLANNED if analysis.program is None else f"as driven, {analysis.recording.origin}"
+        driven = (name, costs.energy_of_year(cycle).value)
     if cycle is None or cycle.savings is None or saved is None:
-        return Paid(None, 0.0, idle)
+        counted = "" if cycle is None else f", {cycles_of_year(cycle.pace, costs)}"
+        return Paid(None, 0.0, idle, counted, driven=driven)
     total = cycle.savings.total
     pace = total.seconds or cycle.seconds
     common = total.common * costs.cycles_per_year(pace)
     said = f", {cycles_of_year(pace, costs)}"
-    driven = None
-    if analysis.program is not None:
-        nights = "" if idle is None else ", nights on brakes"
-        name = f"as driven, {analysis.recording.origin}{nights}"
-        driven = (name, costs.energy_of_year(cycle).value)
     run = ""
     more = more_parts(cycle.savings)
-    if driven is not None:
+    if analysis.program is not None:
         run = (
             f"As driven ({analysis.recording.origin}) a cycle takes "
             f"{kilowatt_hours(cycle.energy)}, as planned {kilowatt_hours(total.planned)}."
         )
+    else:
+        driven = None
     proved = analysis.recording.only_planned and analysis.recording.planned_certified
-    return Paid(saved, common, idle, said, COMMON, driven, cycle.supply, proved, run, more)
+    reached = saved if driven is not None else None
+    return Paid(saved, common, idle, said, COMMON, driven, cycle.supply, proved, run, more, reached)
 
 
 def more_parts(savings: ProgramSavings) -> str:
@@ -431,7 +456,7 @@ def _unshortened(program: ProgramTotals) -> Tile | None:
     return Tile(
         "cycle with full pauses",
         kilowatt_hours(full.energy),
-        (f"in {seconds(full.seconds)}", cut, "computed from this run and the data"),
+        (cut, "computed from this run and the data"),
     )
 
 

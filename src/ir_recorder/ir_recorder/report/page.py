@@ -19,6 +19,7 @@ from ir_recorder.report.costs import (
     assumed_section,
     clock_section,
     costs_section,
+    following_price,
     lever_section,
 )
 from ir_recorder.report.data import page_data
@@ -35,6 +36,7 @@ from ir_recorder.report.headline import (
     verdict,
 )
 from ir_recorder.report.methods import methods_section
+from ir_recorder.report.money_text import with_elements
 from ir_recorder.report.number_text import joules, text
 from ir_recorder.report.sankey import sankey_section
 from ir_recorder.report.tables import (
@@ -70,7 +72,16 @@ CHARTS: Mapping[str, Chart] = {
 
 _ASSETS = files("ir_recorder") / "report" / "assets"
 PAGE_START = b"<!doctype html>"
-SCRIPTS = ("charts.js", "axes.js", "renderer.js", "motion.js", "player.js", "export.js", "app.js")
+SCRIPTS = (
+    "charts.js",
+    "axes.js",
+    "renderer.js",
+    "motion.js",
+    "player.js",
+    "export.js",
+    "price.js",
+    "app.js",
+)
 
 
 def write_report(
@@ -103,7 +114,7 @@ def report_html(
 
     The chart of clearances shows the recorded safety distance, else that of the tolerances.
     """
-    prices = costs or Costs()
+    prices = following_price(costs or Costs())
     known = not math.isnan(analysis.safety_distance)
     drawn = analysis.safety_distance if known else (tolerances or Tolerances()).safety_distance
     name = analysis.cell.name if analysis.cell is not None else analysis.recording.path.stem
@@ -136,7 +147,15 @@ def report_html(
         **{name: chart(analysis) for name, chart in CHARTS.items()},
     }
     parts |= {name: folded(parts[name]) for name in ("savings", "methods")}
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("page.html"))
+    return filled(asset("page.html"), parts)
+
+
+def filled(page: str, parts: Mapping[str, str]) -> str:
+    """The page with each {{name}} replaced by its part, and its amounts of money by elements that
+    follow the reader's price.
+    """
+    shown = {name: with_elements(part) for name, part in parts.items()}
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: shown[match[1]], page)
 
 
 def _subject(analysis: Analysis) -> str:

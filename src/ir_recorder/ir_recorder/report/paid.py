@@ -11,15 +11,21 @@ from ir_recorder.analysis.production import Amount
 from ir_recorder.report.answer import Answer
 from ir_recorder.report.bars import Piece, Row, bars
 from ir_recorder.report.costs import (
+    COMMON,
+    PLANNED,
+    TODAY,
     Costs,
     IdleSaving,
     SavedYear,
-    assumed_prices,
-    money_of,
     money_of_thousand,
     payback,
     saved_year,
-    together,
+)
+from ir_recorder.report.money_text import (
+    NOTHING,
+    money_of,
+    price_field,
+    sum_of_money,
     yearly_money,
     yearly_span,
 )
@@ -40,13 +46,15 @@ class Tile:
         return f'<div class="tile"><span>{text(self.name)}</span><b>{text(self.value)}</b>{notes}</div>'  # noqa: E501
 
 
-MOVEMENTS = "movements as planned"
+MOVEMENTS = "movements of the planned program"
 PAUSES = "pauses in the planned power modes"
 """What a plan saves with, in words."""
 CERTIFIED = "No collision: certified by bounds at every instant, not by samples."
 """How a planned program is proved."""
-COMMON = "common program"
-"""What plans are held against where nobody gave today's program."""
+SAVED = "saved"
+REACHED = "reached"
+LEFT = "still to save"
+"""Rows of a year: what the planned program saves, or what of it was driven, and what is left."""
 _ROUNDED = " Each amount is rounded by itself."
 _COMMON = " Common program: the same stations by PTP at 100 %, its pauses left to the controller."
 
@@ -58,104 +66,185 @@ class Paid:
     made of, in words; before: what it is held against. driven: what else a year of it is called,
     and what that takes [J]: nothing is known of its nights, so they are as before. supply: what
     limits the figures. proved: whether the planned program is certified. run: what was driven, in
-    a sentence. more: what else the plan gains.
+    a sentence. more: what else the plan gains. reached [J]: how much of `saved` was driven; None
+    where nothing was.
     """
 
     saved: Amount | None
     common: float
     idle: IdleSaving | None
     counted: str = ""
-    before: str = "today"
+    before: str = TODAY
     driven: tuple[str, float] | None = None
     supply: str = ""
     proved: bool = False
     run: str = ""
     more: str = ""
+    reached: Amount | None = None
 
     def answer(
         self, costs: Costs, steps: Sequence[Step], part: tuple[float, float] | None = None
     ) -> Answer:
-        """What a page says first; the saving must be known. part [J]: what a part took and takes
-        then.
+        """What a page says first; the saving must be known. steps: what the plan saves with; part
+        [J]: what a part took and takes then.
         """
         year = self.year(costs)
         word, gain = year.money.gain()
         less = "less" if word == "saved" else "more"
-        nights = 0.0 if self.idle is None else self.idle.left_alone
-        today = together((costs.money(self.common), nights))
+        before = self.before_amounts(costs)
         energy = year.with_energy(costs)
-        share = f"{_percent(gain.value, today)} of {yearly_money(today, costs.currency)}"
-        said = (f"{energy} {less}" if energy else "", share, payback(year.money, costs), self.more)
+        share = (
+            f"{percent_of(gain.value, sum(before))} of the "
+            f"{sum_of_money(before, costs.currency)} of the {self.before}"
+        )
+        said = (share, f"{energy} {less}" if energy else "", payback(year.money, costs), self.more)
         result = f"{yearly_money(gain.value, costs.currency)} {less} a year"
         if self.saved is not None and self.saved.doubt:
             result = f"Open whether anything is saved: {result}"
+        reached = self.has_reached
+        if reached is not None and reached.value >= gain.value:
+            result = f"{yearly_money(gain.value, costs.currency)} {less} a year: reached"
+        elif reached is not None:
+            of = yearly_money(gain.value, costs.currency)
+            result = f"{reached_of(reached.of(costs.money), of, costs)} a year reached"
         words = "; ".join(each for each in said if each)
+        own = first_steps(steps, None, costs)
+        nights = first_steps((), self.idle, costs)
         return Answer(
             result,
             f"{words}.",
             self.sure(costs),
-            first_steps(steps, self.idle, costs) or "Keep the program as it is.",
-            [*_of_parts(part, costs), *a_night(self.idle, costs), f"{assumed_prices(costs)}."],
+            nights if reached is not None else first_steps(steps, self.idle, costs) or KEEP,
+            [*_of_parts(part, costs), *a_night(self.idle, costs)],
+            between_of(gain, costs),
+            own if reached is not None else (),
+            counted_at(costs),
         )
 
-    def sure(self, costs: Costs) -> str:
-        """How sure a saving is: its interval, and what each part of it rests on."""
+    @property
+    def has_reached(self) -> Amount | None:
+        """What was driven of a saving that is one; None elsewhere."""
+        saves = self.saved is not None and self.saved.value > 0.0 and not self.saved.doubt
+        return self.reached if saves else None
+
+    def before_amounts(self, costs: Costs) -> tuple[float, float]:
+        """Money of a year before: in shifts, and outside of them where that is known."""
+        nights = 0.0 if self.idle is None else self.idle.left_alone
+        return costs.money(self.common), nights
+
+    def sure(self, costs: Costs) -> list[str]:
+        """How sure a saving is: what its interval is of, and what each part of it rests on."""
         said = []
         if self.saved is not None:
-            between = _between(self.year(costs).money.gain()[1], costs)
-            said += [
-                f"{between}, of the robot's data alone." if between else "",
-                self.supply,
-                "What plans save is predicted.",
-            ]
+            limit = f"; {self.supply}" if self.supply else ""
+            spread = ", the interval is of the robot's data alone" if self._spreads(costs) else ""
+            said.append(f"What plans save is predicted{spread}{limit}.")
         said.append(self.run)
         if self.idle is not None:
             late = "a robot that is woken late delays the first cycle"
             said.append(f"What nights save is {self.idle.basis}; {late}.")
         if self.proved:
             said.append(CERTIFIED)
-        return " ".join(each for each in said if each)
+        return [each for each in said if each]
+
+    def _spreads(self, costs: Costs) -> bool:
+        money = self.year(costs).money
+        return money.low < money.high
 
     def picture(self, costs: Costs) -> str:
-        """A year before and after; "" where the saving isn't known."""
-        if self.saved is None:
+        """A year before and after; "" where neither the saving nor what rest saves is known."""
+        rows = self._rows(costs) if self.saved is not None else self._rows_of_nights(costs)
+        if not rows:
             return ""
-        nights = (0.0, 0.0) if self.idle is None else (self.idle.left_alone, self.idle.deepest)
-        shifts = costs.money(self.common), costs.money(self.common - self.saved.value)
-        rows = [
-            _year_row(self.before, "today", (shifts[0], nights[0]), costs),
-            _year_row("as planned", "planned", (shifts[1], nights[1]), costs),
-        ]
-        if self.driven is not None:
-            name, energy = self.driven
-            rows.append(_year_row(name, "driven", (costs.money(energy), nights[0]), costs))
-        saved = self.year(costs).money
-        between = _between(saved, costs)
-        if saved.value > 0.0:
-            rows.append(self._saved_row(saved, between, costs))
         pale = " Pale: at night and at weekends." if self.idle is not None else ""
-        whisker = " Whisker: 90 % interval of what is saved." if between else ""
-        common = _COMMON if self.before == COMMON else ""
+        spread = any(row.whisker[0] < row.whisker[1] for row in rows)
+        whisker = " Whisker: 90 % interval." if spread else ""
+        common = _COMMON if self.before.startswith(COMMON) else ""
         hint = f"In full colour: in shifts{self.counted}.{pale}{whisker}{common}{_ROUNDED}"
         return (
             f'<section id="year"><h2>Energy costs of a year</h2>'
             f'{bars(rows, "energy costs of a year")}<p class="hint">{text(hint)}</p></section>'
         )
 
-    def _saved_row(self, saved: Amount, between: str, costs: Costs) -> Row:
-        """What is saved of a year, with the whisker of its interval."""
-        name = "saved as planned"
-        nights = 0.0 if self.idle is None else self.idle.saved
-        pieces = (
-            Piece("saved", f"{name} in shifts", saved.value - nights),
-            Piece("saved night", f"{name} at night and at weekends", nights),
-        )
-        price = yearly_money(saved.value, costs.currency)
-        return Row(name, pieces, price, (between,), whisker=(saved.low, saved.high))
+    def _rows(self, costs: Costs) -> list[Row]:
+        """The programs, and what is saved: what was reached and what is left, where it was
+        driven.
+        """
+        assert self.saved is not None
+        nights = (0.0, 0.0) if self.idle is None else (self.idle.left_alone, self.idle.deepest)
+        shifts = self.before_amounts(costs)[0], costs.money(self.common - self.saved.value)
+        rows = [
+            _year_row(self.before, "today", (shifts[0], nights[0]), costs),
+            _year_row(PLANNED, "planned", (shifts[1], nights[1]), costs),
+        ]
+        if self.driven is not None:
+            name, energy = self.driven
+            rows.append(_year_row(name, "driven", (costs.money(energy), nights[0]), costs))
+        saved = self.year(costs).money
+        reached = self.has_reached
+        if reached is not None:
+            mine = reached.of(costs.money)
+            rows.append(_saved_row(REACHED, mine, 0.0, costs))
+            idle = 0.0 if self.idle is None else self.idle.saved
+            left = Amount(saved.value - mine.value, saved.low - mine.low, saved.high - mine.high)
+            if left.value >= NOTHING:
+                rows.append(_saved_row(LEFT, left, min(idle, left.value), costs))
+        elif saved.value > 0.0:
+            idle = 0.0 if self.idle is None else self.idle.saved
+            rows.append(_saved_row(SAVED, saved, idle, costs))
+        return rows
+
+    def _rows_of_nights(self, costs: Costs) -> list[Row]:
+        """A year of what was driven or planned, and what rest would save of it."""
+        if self.driven is None or self.idle is None:
+            return []
+        name, energy = self.driven
+        idle = self.idle
+        shifts = costs.money(energy)
+        return [
+            _year_row(name, "driven", (shifts, idle.left_alone), costs),
+            _year_row(f"with {idle.mode} at night", "planned", (shifts, idle.deepest), costs),
+            _saved_row(LEFT, idle.money, idle.saved, costs),
+        ]
 
     def year(self, costs: Costs) -> SavedYear:
         """What is saved of a year in all; what isn't known counts as nothing."""
         return saved_year(self.saved or Amount(0.0, 0.0, 0.0), self.idle, costs)
+
+
+KEEP = "Keep the program as it is."
+
+
+def reached_of(reached: Amount, whole: str, costs: Costs) -> str:
+    """How much of a saving was driven, in money: "106 of 323 EUR"."""
+    shown = yearly_money(reached.value, costs.currency)
+    return f"{shown.removesuffix(f' {costs.currency}')} of {whole}"
+
+
+def counted_at(costs: Costs) -> str:
+    """The price and the shifts that a year is counted with (HTML): the price is a field, which all
+    amounts of the page follow.
+    """
+    own = {"price", "shift_hours", "shifts_per_day", "days_per_year"} <= set(costs.given)
+    follow = "; type your own price, and every amount follows" if costs.follows_price else ""
+    shifts = (
+        f"{costs.shifts_per_day:g} x {costs.shift_hours:g} h on {costs.days_per_year:g} days a year"
+        f"{'' if own else ', assumed'}"
+    )
+    return (
+        f"{price_field(costs.price, costs.currency)}, {text(shifts)}"
+        f'<span class="screen">{text(follow)}</span>.'
+    )
+
+
+def _saved_row(name: str, saved: Amount, nights: float, costs: Costs) -> Row:
+    """What is saved of a year, with the whisker of its interval; nights: outside of shifts."""
+    pieces = (
+        Piece("saved", f"{name} in shifts", saved.value - nights),
+        Piece("saved night", f"{name} at night and at weekends", nights),
+    )
+    price = yearly_money(saved.value, costs.currency)
+    return Row(name, pieces, price, (between_of(saved, costs),), whisker=(saved.low, saved.high))
 
 
 Step = tuple[Amount, str]
@@ -186,7 +275,11 @@ def at_night(idle: IdleSaving) -> str:
 def with_span(money: Amount, costs: Costs) -> str:
     """An amount of a year, its 90 % interval in brackets."""
     shown = money_of(money, costs.currency)
-    return f"{shown} ({yearly_span(money.low, money.high)})" if money.low < money.high else shown
+    return (
+        f"{shown} ({yearly_span(money.low, money.high, costs.currency)})"
+        if money.low < money.high
+        else shown
+    )
 
 
 _WORTH = 0.01  # of a currency, a year: less is no step
@@ -232,12 +325,12 @@ def _year_row(
 ) -> Row:
     """A bar of a year: money in shifts, and outside of them."""
     shifts, nights = (yearly_money(each, costs.currency) for each in money)
-    pieces = [Piece(style, f"in shifts {shifts}", money[0])]
+    pieces = [Piece(style, "in shifts", money[0])]
     parts = ""
     if money[1] > 0.0:
-        pieces.append(Piece(f"{style} night", f"at night and at weekends {nights}", money[1]))
+        pieces.append(Piece(f"{style} night", "at night and at weekends", money[1]))
         parts = f"{shifts} in shifts, {nights} outside"
-    price = yearly_money(together(money), costs.currency)
+    price = sum_of_money(money, costs.currency)
     return Row(name, tuple(pieces), price, (parts,))
 
 
@@ -246,11 +339,14 @@ def row_of(tiles: Sequence[Tile]) -> str:
     return f'<section class="tiles">{"".join(tile.html() for tile in tiles)}</section>'
 
 
-def _percent(part: float, whole: float) -> str:
+def percent_of(part: float, whole: float) -> str:
+    """A part of a whole in percent; "" without a whole."""
     return f"{100.0 * part / whole:.1f} %" if whole > 0.0 else ""
 
 
-def _between(price: Amount, costs: Costs) -> str:
+def between_of(price: Amount, costs: Costs) -> str:
+    """The 90 % interval of an amount of a year, in words; "" without one."""
     if price.high <= price.low:
         return ""
-    return f"90 % interval {yearly_span(price.low, price.high)} {costs.currency}"
+    ends = yearly_span(price.low, price.high, costs.currency)
+    return f"90 % interval {ends} {costs.currency}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,21 +25,23 @@ from ir_recorder.analysis.production import (
 from ir_recorder.report.cell_scene import cell_scene
 from ir_recorder.report.charts import Point, front_part
 from ir_recorder.report.costs import (
+    COMMON,
     J_PER_KWH,
+    PLANNED,
+    TODAY,
     Costs,
     IdleSaving,
     assumed_section,
     counted_with,
     cycles_of_year,
-    demand_money,
+    demand_note,
+    following_price,
     how_to_hibernate,
     idle_saving,
-    money_of,
     share_between,
-    yearly_money,
-    yearly_span,
 )
 from ir_recorder.report.files import write_output
+from ir_recorder.report.money_text import money_of, yearly_money, yearly_span
 from ir_recorder.report.motion_scene import common_rests, in_step, motion_of, power_curves, rests_of
 from ir_recorder.report.number_text import (
     DASH,
@@ -55,7 +56,7 @@ from ir_recorder.report.number_text import (
     watt_hours,
     watts,
 )
-from ir_recorder.report.page import PAGE_START, asset, folded
+from ir_recorder.report.page import PAGE_START, asset, filled, folded
 from ir_recorder.report.paid import MOVEMENTS, PAUSES, Paid, Tile, at_night, row_of
 from ir_recorder.report.series import long_rests
 from ir_recorder.report.shell import badge
@@ -131,7 +132,8 @@ def _paid(found: BeforeAfter, cell: Cell, costs: Costs) -> Paid:
     today = side.saving.common * year.cycles_a_year
     counted = f", {cycles_of_year(year.pace, costs)}"
     idle = _idle(found, cell, costs)
-    return Paid(year.saved, today, idle, counted, proved=side.certified)
+    before = program_before(found)
+    return Paid(year.saved, today, idle, counted, before, proved=side.certified)
 
 
 def tiles(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
@@ -144,6 +146,7 @@ def tiles(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     saving = side.saving
     word, cycle = saved_amount(saving).gain()
     quarter = demand_of(side)
+    before = program_before(found)
     return row_of(
         [
             Tile(
@@ -158,12 +161,12 @@ def tiles(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
             Tile(
                 "cycle time",
                 seconds(report.duration),
-                (f"today {seconds(today.duration)}", f"{seconds(_standing(side))} of it pauses"),
+                (f"{before} {seconds(today.duration)}", f"{seconds(_standing(side))} of it pauses"),
             ),
             Tile(
                 "largest quarter of an hour",
                 watts(quarter),
-                (f"today {watts(demand_of(found.today))}", demand_money(quarter, costs)),
+                (f"{before} {watts(demand_of(found.today))}", demand_note(quarter, costs)),
             ),
             Tile(
                 "peak power",
@@ -171,12 +174,26 @@ def tiles(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
                 (
                     f"90 % interval {span_of(*side.peak, watts)}",
                     one_sided(report.peak_power, *side.peak),
-                    f"today {watts(today.peak_power)}",
+                    f"{before} {watts(today.peak_power)}",
                     "of a 10 ms reading",
                 ),
             ),
         ]
     )
+
+
+def program_before(found: BeforeAfter) -> str:
+    """The name of what the planned program is held against."""
+    return COMMON if found.kind == COMMON else TODAY
+
+
+def shown_name(found: BeforeAfter, side: Side) -> str:
+    """A side as all pages call it: the program before, the planned one that changes lead to, and
+    others by what they are asked for.
+    """
+    if side is found.today:
+        return program_before(found)
+    return PLANNED if side is found.planned else f"{PLANNED}, {side.name}"
 
 
 def _standing(side: Side) -> float:
@@ -193,7 +210,10 @@ def figure_table(found: BeforeAfter, costs: Costs) -> str:
         ("cycle time", *(_of(side, seconds(side.report.duration)) for side in sides)),
         ("energy a cycle", *(_energy(side, kilowatt_hours) for side in sides)),
         *_a_part(sides, costs),
-        ("against today", *(_saved(side, side is found.today) for side in sides)),
+        (
+            f"against the {program_before(found)}",
+            *(_saved(side, side is found.today) for side in sides),
+        ),
         ("cycles a shift", *(_cycles(year) for year in years)),
         (
             "energy a shift",
@@ -226,11 +246,11 @@ def figure_table(found: BeforeAfter, costs: Costs) -> str:
     alike = [side.name for side in found.sides if _alike(found, side)]
     left_out = (
         f'<p class="hint">Left out, as energy and time of a cycle differ by less than 1 % from '
-        f"\u201c{text(found.towards)}\u201d: {text(', '.join(alike))}.</p>"
+        f"the {PLANNED}: {text(', '.join(alike))}.</p>"
         if alike
         else ""
     )
-    return table(("", *(f">{side.name}" for side in sides)), rows, "Figures") + left_out
+    return table(_heads(found, sides), rows, "Figures") + left_out
 
 
 def _alike(found: BeforeAfter, side: Side) -> bool:
@@ -262,7 +282,7 @@ def _demand(side: Side, costs: Costs) -> str:
     if not side.found:
         return DASH
     power = demand_of(side)
-    return _cell(watts(power), demand_money(power, costs))
+    return _cell(watts(power), demand_note(power, costs))
 
 
 def _idle(found: BeforeAfter, cell: Cell, costs: Costs) -> IdleSaving | None:
@@ -310,7 +330,7 @@ def change_table(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
 
 def _price(amount: Amount, costs: Costs) -> str:
     """Money of a year with its interval."""
-    ends = f"{yearly_span(amount.low, amount.high)} {costs.currency}"
+    ends = f"{yearly_span(amount.low, amount.high, costs.currency)} {costs.currency}"
     return _cell(money_of(amount, costs.currency), ends if amount.high > amount.low else "")
 
 
@@ -346,7 +366,12 @@ def hop_table(found: BeforeAfter) -> str:
     keyed = [dict(_keyed(side)) for side in sides]
     keys = list(dict.fromkeys(key for own in keyed for key in own))
     rows = [(_numbered(*key), *(own.get(key, DASH) for own in keyed)) for key in keys]
-    return table(("", *(f">{side.name}" for side in sides)), rows, "Movements and pauses")
+    return table(_heads(found, sides), rows, "Movements and pauses")
+
+
+def _heads(found: BeforeAfter, sides: Sequence[Side]) -> tuple[str, ...]:
+    """A column for each program."""
+    return ("", *(f">{shown_name(found, side)}" for side in sides))
 
 
 def _numbered(name: str, which: int) -> str:
@@ -477,7 +502,7 @@ def _co2(year: Year | None, costs: Costs) -> str:
 def _money(energy: Amount, costs: Costs) -> str:
     amount = energy.of(costs.money)
     return (
-        f"{yearly_span(amount.low, amount.high)} {costs.currency}"
+        f"{yearly_span(amount.low, amount.high, costs.currency)} {costs.currency}"
         if amount.high > amount.low
         else ""
     )
@@ -510,6 +535,7 @@ SCRIPTS = (
     "motion.js",
     "player.js",
     "export.js",
+    "price.js",
     "before_after.js",
 )
 
@@ -527,19 +553,20 @@ def write_before_after(
 
 def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None) -> str:
     """The page as text; without `costs` with those that are assumed."""
-    prices = costs or Costs()
+    prices = following_price(costs or Costs())
     there = [found.today, *(side for side in found.sides if side.found and not _alike(found, side))]
     data = {
         "end": max(side.report.duration for side in there),
         "cell": cell_scene(cell),
         "sides": [motion_of(side, cell) for side in there],
         "planned": found.towards,
-        "axes": [power_curves(there)],
+        "before": program_before(found),
+        "axes": [{**power_curves(there), "names": [shown_name(found, each) for each in there]}],
         "curves": {"end": max(each.end for each in in_step(there)), "rests": common_rests(there)},
         "rests": long_rests([rests_of(side) for side in there]),
     }
     parts = {
-        "title": text(f"{cell.name}: today and planned"),
+        "title": text(f"{cell.name}: {program_before(found)} and {PLANNED}"),
         "subtitle": text(
             f"{found.name} ({found.kind}) against what the planner makes of the same stops"
         ),
@@ -555,13 +582,14 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
         "assumed": assumed_section(prices),
         "changes": change_table(found, cell, prices),
         "hops": hop_table(found),
-        "front": front_part(_points(there)),
-        "choices": "".join(_choice(side, found.towards) for side in there[1:]),
+        "front": front_part(_points(found, there)),
+        "before": text(program_before(found)),
+        "choices": "".join(_choice(found, side) for side in there[1:]),
         "style": asset("page.css") + asset("before_after.css"),
         "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
         "script": "\n".join(asset(script) for script in SCRIPTS),
     }
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("before_after.html"))
+    return filled(asset("before_after.html"), parts)
 
 
 def _line(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
@@ -582,18 +610,19 @@ def _problems(found: BeforeAfter, cell: Cell) -> str:
     return f'<div class="problems calm"><b>Notes</b><ul>{listed}</ul></div>'
 
 
-def _points(sides: Sequence[Side]) -> list[Point]:
+def _points(found: BeforeAfter, sides: Sequence[Side]) -> list[Point]:
     """The programs, today's first."""
     points: list[Point] = []
     for side in sides:
         report = side.report
-        points.append(Point(side.name, report.duration, report.energy, "predicted"))
+        points.append(Point(shown_name(found, side), report.duration, report.energy, "predicted"))
     return points
 
 
-def _choice(side: Side, towards: str) -> str:
-    chosen = " selected" if side.name == towards else ""
-    return f'<option value="{text(side.name)}"{chosen}>{text(side.name)}</option>'
+def _choice(found: BeforeAfter, side: Side) -> str:
+    chosen = " selected" if side is found.planned else ""
+    shown = shown_name(found, side)
+    return f'<option value="{text(side.name)}"{chosen}>{text(shown)}</option>'
 
 
 # Every movement and pause of all programs as columns of numbers, for CSV, Parquet and pandas: SI

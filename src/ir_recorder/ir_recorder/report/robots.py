@@ -12,7 +12,6 @@ import numpy as np
 
 from ir_recorder.analysis import Analysis, Finding
 from ir_recorder.analysis.production import (
-    Amount,
     Production,
     idle_watts,
     largest_quarter,
@@ -30,17 +29,26 @@ from ir_recorder.report.costs import (
     IdleSaving,
     assumed_section,
     counted_with,
+    cycles_of_year,
+    demand_note,
+    following_price,
     idle_saving,
     money_of_thousand,
-    yearly_money,
-    yearly_span,
 )
 from ir_recorder.report.files import write_output
 from ir_recorder.report.gantt import Bar, Gantt, legend, mode_bars, together
-from ir_recorder.report.headline import checked, failing, source, verdict, yearly_tile
+from ir_recorder.report.headline import (
+    checked,
+    failing,
+    source,
+    verdict,
+    year_in_words,
+    yearly_tile,
+)
 from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import (
     DASH,
+    kilograms,
     kilowatt_hours,
     number,
     seconds,
@@ -49,7 +57,7 @@ from ir_recorder.report.number_text import (
     watts,
 )
 from ir_recorder.report.page import PAGE_START
-from ir_recorder.report.paid import Tile, row_of
+from ir_recorder.report.paid import Paid, Tile, a_night, counted_at, first_steps, row_of
 from ir_recorder.report.shell import shell
 from ir_recorder.report.tables import check_table, table
 from ir_values.files import ANYWHERE, FileRoots
@@ -69,13 +77,14 @@ def robots_html(
     analyses: Mapping[str, Analysis], checks: Sequence[Finding], costs: Costs | None = None
 ) -> str:
     """The page as text; without `costs` with those that are assumed."""
-    prices = costs or Costs()
+    prices = following_price(costs or Costs())
     first = next(iter(analyses.values()))
     cell = first.cell.name.rpartition(".")[0] if first.cell is not None else ""
     name = cell or first.recording.path.stem
     cycle = common_cycle(analyses)
     main = [
         _answer(analyses, checks, cycle, prices).html(),
+        _picture(analyses, cycle, prices),
         row_of(_tiles(analyses, cycle, prices)),
         failing(checks),
         f"<section><h2>Energy, money and time</h2>{_table(analyses, cycle, prices)}</section>",
@@ -103,23 +112,41 @@ def _answer(
     driven = sum(map(driven_joules, every))
     predicted = sum(map(predicted_joules, every))
     found = ", ".join(f"{check.name} {number(check.measured, check.unit)}" for check in checks)
-    sure = f"{checked(checks)[1].capitalize()}: {found}."
+    sure = [f"{checked(checks)[1].capitalize()}: {found}."]
     if predicted > 0.0:
-        sure = (
+        sure.insert(
+            0,
             f"One {next(iter(every)).recording.origin} run: "
             f"{100.0 * (driven / predicted - 1.0):+.1f} % against the plan, which knows no waits "
-            f"for signals. {sure}"
+            "for signals.",
         )
     if cycle is None:
         words = "No cycle of all robots was driven to its end, or its energy is not known."
         return Answer("A year is not known", words, sure)
-    year = costs.energy_of_year(cycle).value
+    year = costs.energy_of_year(cycle)
+    idle = _idle_of_all(analyses, costs)
+    taken = f"{kilowatt_hours(year.value)}, {kilograms(costs.co2(year.value))} CO2"
+    result, words = year_in_words(year, idle, taken, costs)
     part = cycle.energy / costs.parts_per_cycle
-    result = f"{yearly_money(costs.money(year), costs.currency)} a year in shifts"
-    words = (
-        f"for all robots. A part takes {kilowatt_hours(part)}, {money_of_thousand(part, costs)}."
+    each = f"Parts: {money_of_thousand(part, costs)}"
+    rest = [f"What nights save is {idle.basis}."] if idle is not None else []
+    return Answer(
+        result,
+        f"All {len(analyses)} robots: {words}",
+        [*sure, *rest],
+        _to_do(analyses, cycle, costs),
+        [each, *a_night(idle, costs)],
+        counted=counted_at(costs),
     )
-    return Answer(result, words, sure, _to_do(analyses, cycle, costs))
+
+
+def _picture(analyses: Mapping[str, Analysis], cycle: Production | None, costs: Costs) -> str:
+    """A year of all robots, and what rest outside of the shifts saves of it."""
+    if cycle is None:
+        return ""
+    driven = (f"as driven, {cycle.origin}", costs.energy_of_year(cycle).value)
+    said = f", {cycles_of_year(cycle.pace, costs)}"
+    return Paid(None, 0.0, _idle_of_all(analyses, costs), said, driven=driven).picture(costs)
 
 
 def _to_do(analyses: Mapping[str, Analysis], cycle: Production, costs: Costs) -> list[str]:
@@ -127,11 +154,7 @@ def _to_do(analyses: Mapping[str, Analysis], cycle: Production, costs: Costs) ->
     idle = _idle_of_all(analyses, costs)
     said = []
     if idle is not None:
-        price = yearly_money(idle.saved, costs.currency)
-        said.append(
-            f"Let all go into {idle.mode} at night and at weekends: {price} a year less"
-            f"{_ends(idle.money, costs)}, {idle.basis}."
-        )
+        said += first_steps((), idle, costs)
     waits = {name: sum(waited(a).values()) / cycle.cycles for name, a in analyses.items()}
     longest = max(waits, key=lambda name: waits[name])
     if waits[longest] > _LONG_WAIT * cycle.seconds:
@@ -152,13 +175,6 @@ def _idle_of_all(analyses: Mapping[str, Analysis], costs: Costs) -> IdleSaving |
     watts_of_all = {mode: sum(rest[mode] for rest in rests) for mode in rests[0]}
     measured = all(map(rest_measured, every))
     return idle_saving(watts_of_all, sum_of(saves), costs, measured=measured)
-
-
-def _ends(price: Amount, costs: Costs) -> str:
-    """The 90 % interval of an amount of a year in brackets; "" without one."""
-    if price.low >= price.high:
-        return ""
-    return f" (90 % interval {yearly_span(price.low, price.high)} {costs.currency})"
 
 
 _LONG_WAIT = 0.05  # of a cycle: less is no work worth moving
@@ -188,11 +204,8 @@ def _tiles(analyses: Mapping[str, Analysis], cycle: Production | None, costs: Co
 def _demand(analyses: Mapping[str, Analysis], costs: Costs) -> Tile:
     """The largest quarter of an hour of all together, and its price where one is given."""
     power = common_demand(analyses)
-    price = ""
-    if costs.demand_price > 0.0:
-        price = f"{yearly_money(power / 1000.0 * costs.demand_price, costs.currency)} a year"
     words = "mean power of all robots, cycle after cycle"
-    return Tile("largest quarter of an hour", watts(power), (words, price))
+    return Tile("largest quarter of an hour", watts(power), (demand_note(power, costs), words))
 
 
 def _table(analyses: Mapping[str, Analysis], cycle: Production | None, costs: Costs) -> str:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ir_recorder.report.money_text import with_elements
 from ir_recorder.report.number_text import text
 from ir_recorder.report.page import asset
 
-_PLAIN = "themes(() => {}, () => {});\nexportButtons();"
-SCRIPTS = ("charts.js", "export.js")
+_PLAIN = "themes(() => {}, () => {});\nexportButtons();\nfoldOnPhones(FIRST);"
+SCRIPTS = ("charts.js", "export.js", "price.js")
 """Of a page without curves."""
 
 
@@ -38,5 +39,5 @@ def shell(
         f'<p class="subtitle">{text(subtitle)}</p></div>\n'
         f'<div class="badges">{"".join(badges)}</div>\n'
         '<button id="theme" type="button" title="light or dark" aria-label="light or dark">\u25d0'
-        f"</button>\n</header>\n<main>\n{main}\n</main>\n<script>{own}</script>\n</body>\n</html>\n"
+        f"</button>\n</header>\n<main>\n{with_elements(main)}\n</main>\n<script>{own}</script>\n</body>\n</html>\n"
     )

@@ -19,15 +19,9 @@ from ir_planner.checks import JouleInterval
 from ir_recorder.analysis.production import Amount
 from ir_recorder.report.answer import Answer
 from ir_recorder.report.bars import Piece, Row, bars, tick_step
-from ir_recorder.report.costs import (
-    Costs,
-    assumed_section,
-    counted_with,
-    payback,
-    yearly_money,
-    yearly_span,
-)
+from ir_recorder.report.costs import Costs, assumed_section, counted_with, payback
 from ir_recorder.report.files import write_output
+from ir_recorder.report.money_text import yearly_money, yearly_span
 from ir_recorder.report.number_text import (
     DASH,
     kilowatt_hours,
@@ -356,7 +350,7 @@ def _answer(
         f"{kilowatt_hours(like.mean())} at the mains a cycle, pauses included ({share}); the "
         f"movements alone take {moved}."
     )
-    ends_of = yearly_span(year.money.low, year.money.high)
+    ends_of = yearly_span(year.money.low, year.money.high, costs.currency)
     sure = (
         f"90 % interval {ends_of} {costs.currency}, of the robot's data alone; "
         f"{_between_seeds(one)}. {_at_limits(one, settings)}Predicted, not driven."
@@ -459,7 +453,7 @@ def _bars(finals: Sequence[Sequence[Final]], costs: Costs) -> str:
                 continue
             year = _year(one, of_condition(given, one), costs)
             price = yearly_money(year.money.value, costs.currency)
-            between = yearly_span(year.money.low, year.money.high)
+            between = yearly_span(year.money.low, year.money.high, costs.currency)
             name = f"placement {rank}"
             first = one is own[0]
             notes = (
@@ -571,7 +565,7 @@ def _rows(finals: Sequence[Sequence[Final]], costs: Costs) -> Iterator[tuple[str
                 year = _year(one, like, costs)
                 share = percent(year.energy.value / like.mean()).lstrip("+")
                 less = _with_interval(f"{kilowatt_hours(year.energy.value)} ({share})", year.energy)
-                between = yearly_span(year.money.low, year.money.high)
+                between = yearly_span(year.money.low, year.money.high, costs.currency)
                 money = (
                     f"<b>{text(yearly_money(year.money.value, costs.currency))}</b>"
                     f"<small>{text(between)} {text(costs.currency)}</small>"

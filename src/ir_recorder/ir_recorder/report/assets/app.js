@@ -78,7 +78,8 @@
   if (flows && matchMedia("(max-width: 700px)").matches) flows.open = true;
 
   exportButtons();
-  foldOnPhones(["year", "levers", "tending"]);
+  foldOnPhones([...FIRST, "tending"]);
   const wanted = /[#&]t=([\d.]+)/.exec(location.hash);
-  timeline.seek(wanted ? Number(wanted[1]) : 0);
+  if (data.shown) timeline.zoom(...data.shown);
+  timeline.seek(wanted ? Number(wanted[1]) : timeline.from);
 })();

@@ -34,13 +34,13 @@
 
   new Player(timeline);
   timeline.onChange(() => {
-    find("name-today").textContent = timeline.now > sides.today.seconds ? "today: finished" : "today";
+    find("name-today").textContent = timeline.now > sides.today.seconds ? `${data.before}: finished` : data.before;
   });
 
   themes(() => { for (const chart of charts) chart.schedule(); for (const view of views) view.recolour(); },
     () => { for (const chart of charts) chart.paint(); for (const view of views) { view.recolour(); view.draw(); } });
   exportButtons();
-  foldOnPhones(["year", "changes"]);
+  foldOnPhones([...FIRST, "changes"]);
   timeline.seek(0);
   together.seek(0);
 })();

@@ -141,6 +141,8 @@ class TimeChart {
     canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
     canvas.addEventListener("keydown", (e) => this.key(e));
   }
+  /* Names left of the chart: all charts of a timeline have room for the longest. */
+  rows() { return []; }
   schedule() {
     if (this.pending) return;
     this.pending = requestAnimationFrame(() => { this.pending = 0; this.paint(); });
@@ -202,7 +204,7 @@ class TimeChart {
     const scale = window.devicePixelRatio || 1, box = this.canvas.getBoundingClientRect();
     this.width = box.width;
     this.height = box.height;
-    this.left = box.width < 520 ? 68 : 96;
+    const compact = box.width < 520;
     if (this.canvas.width !== Math.round(box.width * scale)) this.canvas.width = Math.round(box.width * scale);
     if (this.canvas.height !== Math.round(box.height * scale)) this.canvas.height = Math.round(box.height * scale);
     const g = this.canvas.getContext("2d");
@@ -210,6 +212,8 @@ class TimeChart {
     g.clearRect(0, 0, this.width, this.height);
     g.font = `12px ${getComputedStyle(document.body).fontFamily}`;
     g.textBaseline = "middle";
+    for (const name of this.rows()) this.timeline.margin = Math.max(this.timeline.margin || 0, g.measureText(name).width + 12);
+    this.left = Math.max(compact ? 68 : 96, this.timeline.margin || 0);
     return g;
   }
   timeAxis(g) {
@@ -305,6 +309,7 @@ class PowerChart extends TimeChart {
     this.gap = Infinity; /* s: readings that are further apart are not joined */
     this.take(data.lanes);
   }
+  rows() { return this.lanes.map((lane) => lane.label); }
   /* The lanes to draw; the chart grows with them. */
   take(lanes) {
     this.lanes = lanes;

@@ -6,6 +6,7 @@
   const charts = axesSection(find("axes"), timeline, find("tip"), data.axes);
   if (!data.axes.length) find("axes").hidden = true;
   exportButtons();
+  foldOnPhones([...FIRST, "paid"]);
   themes(() => { for (const chart of charts) chart.schedule(); }, () => { for (const chart of charts) chart.paint(); });
   timeline.seek(0);
 })();

@@ -89,16 +89,19 @@ addEventListener("beforeprint", () => {
 addEventListener("afterprint", () => { for (const part of unfolded) part.open = false; });
 
 /* Numbers have a minus, and none is broken from its thousands or its unit at the end of a line. */
+const typesetWords = (words) => words.replace(/(^|\s|\u0028)-(?=\d)/g, "$1\u2212").replace(/(\d) (?=\d{3}(?!\d)|%|(?:[kM]?Wh|k?[JW]|min|h|s|mm|m|kg|EUR|deg)(?!\w))/g, "$1\u00a0");
+
 function typeset() {
   const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   while (walk.nextNode()) {
-    const node = walk.currentNode, words = node.data.replace(/(^|\s|\u0028)-(?=\d)/g, "$1\u2212").replace(/(\d) (?=\d{3}(?!\d)|%|(?:[kM]?Wh|k?[JW]|min|h|s|mm|m|kg|EUR|deg)(?!\w))/g, "$1\u00a0");
+    const node = walk.currentNode, words = typesetWords(node.data);
     if (words !== node.data && !node.parentElement.closest("script, style, code, pre")) node.data = words;
   }
 }
 
 function exportButtons() {
   typeset();
+  if (typeof priceField === "function") priceField();
   const button = (label, name, act) => {
     const element = document.createElement("button");
     element.type = "button";
@@ -128,6 +131,7 @@ function exportButtons() {
 }
 
 /* On a telephone: what comes after the answer opens when its heading is chosen; curves and pictures stay. Paper has what a desk has. */
+const FIRST = ["answer", "year"];
 function foldOnPhones(kept) {
   if (!matchMedia("(max-width: 700px)").matches) return;
   for (const section of document.querySelectorAll("main > section[id]")) {
