@@ -69,6 +69,11 @@ def test_the_page_has_both_motions_and_all_figures(compared: BeforeAfter, planne
         assert words in page
 
 
+def plain(page: str) -> str:
+    """The page without the elements of its amounts of money."""
+    return re.sub(r"</?data[^>]*>", "", page)
+
+
 def test_the_headline_has_money_energy_and_co2_of_shifts_and_nights(
     compared: BeforeAfter, planner: Planner
 ) -> None:
@@ -81,7 +86,7 @@ def test_the_headline_has_money_energy_and_co2_of_shifts_and_nights(
     )
     night = power["STAND_ON_BRAKES"] - power["HIBERNATION"]
     joules = year + night * costs.idle_hours * 3600.0
-    answer = page.split('<section id="answer">')[1].partition("</section>")[0]
+    answer = plain(page).split('<section id="answer">')[1].partition("</section>")[0]
     assert f"<b>{money(joules / J_PER_KWH * 0.27, 'EUR')} less a year</b>" in answer
     assert f"{kilowatt_hours(joules)}, {kilograms(costs.co2(joules))} CO2 less" in answer
     assert "from the data sheet, not measured" in page
@@ -98,9 +103,7 @@ def test_the_largest_quarter_of_an_hour_is_compared(
         mean = side.report.energy / side.report.duration
         assert mean <= demand_of(side) <= side.report.peak_power
         assert watts(demand_of(side)) in row
-    assert "demand price not given" in row
     priced = before_after_html(compared, planner.cell, Costs(demand_price=100.0))
-    assert "demand price not given" not in priced
     assert money(demand_of(compared.planned) / 10.0, "EUR") in priced
 
 
@@ -298,7 +301,7 @@ _YEARLY = re.compile(r'data-head="saved a year">(?:<b>)?([\d .]+) EUR')
 
 def test_what_to_change_adds_up_to_the_result(compared: BeforeAfter, planner: Planner) -> None:
     """Once the table ended with the last change, and nothing said what all of them are together."""
-    page = before_after_html(compared, planner.cell, Costs(price=20.0))
+    page = plain(before_after_html(compared, planner.cell, Costs(price=20.0)))
     changes = page.split('<section id="changes">')[1].partition("</section>")[0]
     *parts, whole = [float(each.replace(" ", "")) for each in _YEARLY.findall(changes)]
     assert len(parts) == len(compared.changes) + 2  # nights, and all other changes
@@ -316,9 +319,9 @@ def test_a_program_that_hardly_differs_is_no_column(
         replace(compared, sides=(same, replace(free, report=near))), planner.cell
     )
     figures = page.split('id="figures"')[1].partition("</section>")[0]
-    assert ">free</th>" not in figures
+    assert ">planned program, free</th>" not in figures
     assert "differ by less than 1 %" in figures
-    assert ">free</th>" in before_after_html(compared, planner.cell)
+    assert ">planned program, free</th>" in before_after_html(compared, planner.cell)
 
 
 def test_the_head_says_what_is_proved(compared: BeforeAfter, planner: Planner) -> None:

@@ -43,6 +43,11 @@ class Figure:
         return abs(self.value - value) <= 1.001 * self.half + 1e-9 * abs(value)
 
 
+def plain(page: str) -> str:
+    """The page without the elements of its amounts of money."""
+    return re.sub(r"<data [^>]*>|</data>", "", page)
+
+
 def figures_in(words: str, name: str) -> Iterator[Figure]:
     """All figures of a text; of the two ends of an interval the one with the unit."""
     for number, unit in _FIGURE.findall(words):
@@ -74,7 +79,7 @@ class _Reader(HTMLParser):
         self._caption = ""
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        if tag in _VOID:
+        if tag in (*_VOID, "data"):  # data: an amount within its words
             return
         kind = dict(attrs).get("class") or ""
         self._open.append((tag, kind))
@@ -99,6 +104,8 @@ class _Reader(HTMLParser):
                 self._row[-1].bold += data
 
     def handle_endtag(self, tag: str) -> None:
+        if tag == "data":
+            return
         while self._open:
             name, kind = self._open.pop()
             if kind == "tile":

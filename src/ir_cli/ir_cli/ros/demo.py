@@ -290,7 +290,7 @@ class Demonstration:
         self._progress.begin("plan the cheapest cycle")
         planner = Planner(cell, clock=time.monotonic)
         plan = planner.plan_steady_cycle(
-            parts_per_hour=tended.parts_per_hour, cycles=tended.cycles, seed=seed
+            parts_per_hour=tended.parts_per_hour, cycles=tended.cycles, seed=seed, saving=True
         )
         if plan.run is None or plan.run_cell is None:
             raise CommandError(plan.status.message)

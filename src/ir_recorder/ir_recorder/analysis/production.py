@@ -280,9 +280,20 @@ def _tended(analysis: Analysis, tending: Tending, whole: Share, notes: Sequence[
         whole.seconds / seconds,
         _modes(analysis, None, seconds, energy, count, time),
         _steps(analysis, None, count, time),
-        analysis.savings if tending.steady else None,
+        _of_parts(analysis.savings, tending),
         tuple(notes),
     )
+
+
+def _of_parts(savings: ProgramSavings | None, tending: Tending) -> ProgramSavings | None:
+    """Savings of a part; None where they are of another program than the parts of a full line."""
+    if savings is None or not tending.steady:
+        return None
+    planned = sum(part.planned_seconds for part in tending.steady) / len(tending.steady)
+    return savings if abs(savings.total.seconds - planned) < _OF_A_PART * planned else None
+
+
+_OF_A_PART = 0.1  # of a part's time
 
 
 def _all_of(analysis: Analysis) -> Span:

@@ -8,6 +8,7 @@ import json
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +40,14 @@ from ir_recorder.report.costs import (
 )
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import checked, plant_of
-from ir_recorder.report.money_text import yearly_money, yearly_span
+from ir_recorder.report.money_text import (
+    money_of,
+    span_of_money,
+    sum_of_money,
+    yearly_money,
+    yearly_span,
+)
+from ir_recorder.report.motion_scene import planned_side, rests_of
 from ir_recorder.report.number_text import (
     DASH,
     joules,
@@ -56,6 +64,7 @@ from ir_recorder.report.paid import a_night, counted_at, first_steps
 from ir_recorder.report.series import Curves, Json, packed, stretches
 from ir_recorder.report.shell import badge, shell
 from ir_recorder.report.tables import COMPACT, table
+from ir_values.arrays import FloatArray
 from ir_values.files import ANYWHERE, FileRoots
 
 MOST = 12  # recordings on one page: more columns than that are not read
@@ -240,19 +249,31 @@ def _year_bars(
     names: Sequence[str],
     costs: Costs,
 ) -> str:
-    """A year of such cycles of each recording, with its interval where it is predicted."""
+    """A year of such cycles of each recording, nights on brakes, with the interval of what is
+    predicted.
+    """
     rows = []
     for analysis, cycle, name in zip(analyses, cycles, names, strict=True):
         if cycle is None:
             continue
-        energy = costs.energy_of_year(cycle)
-        price = energy.of(costs.money)
-        shown = yearly_money(price.value, costs.currency)
-        style = "planned" if analysis.program is None else "driven"
-        notes = (f"a year of such cycles, {cycle.origin}", kilowatt_hours(energy.value))
-        piece = Piece(style, shown, price.value)
-        rows.append(Row(name, (piece,), shown, notes, whisker=(price.low, price.high)))
+        price = costs.energy_of_year(cycle).of(costs.money)
+        idle = recorded_idle_saving(analysis, costs)
+        night = 0.0 if idle is None else idle.left_alone
+        shifts = yearly_money(price.value, costs.currency)
+        style = PLANNED_STYLE if analysis.program is None else "driven"
+        pieces = (
+            Piece(style, "in shifts", price.value),
+            Piece(f"{style} night", "at night and at weekends", night),
+        )
+        outside = f", {yearly_money(night, costs.currency)} outside" if night > 0.0 else ""
+        notes = (f"{shifts} in shifts{outside}, {cycle.origin}",)
+        whisker = (price.low + night, price.high + night)
+        total = sum_of_money((price.value, night), costs.currency)
+        rows.append(Row(name, pieces if night > 0.0 else pieces[:1], total, notes, whisker=whisker))
     return bars(rows, "a year of such cycles") if len(rows) > 1 else ""
+
+
+PLANNED_STYLE = "planned"
 
 
 def _year(cycle: Production | None, first: Production | None, costs: Costs) -> str:
@@ -300,24 +321,27 @@ def _around_the_clock(
     if not any(found):
         return []
     saved = [None if cycle is None else costs.saving_of_year(cycle) for cycle in cycles]
+    idle = next(each for each in found if each is not None)
+    words = (
+        f"{idle.mode} ({watts(idle.watts_deepest)}) instead of closed brakes "
+        f"({watts(idle.watts_left_alone)}), {idle.basis}"
+    )
+    said = f"<small>{text(words)}</small>"
     nights = (DASH if idle is None else _night(idle, costs) for idle in found)
     both = (
         DASH if idle is None or amount is None else _both(amount, idle, costs)
         for idle, amount in zip(found, saved, strict=True)
     )
     return [
-        ("saved at night and at weekends, a year", *nights),
+        (f"saved at night and at weekends, a year{said}", *nights),
         ("both together, a year", *both),
     ]
 
 
 def _night(idle: IdleSaving, costs: Costs) -> str:
-    today, then = (yearly_money(cost, costs.currency) for cost in (idle.left_alone, idle.deepest))
-    return (
-        f"<b>{text(yearly_money(idle.saved, costs.currency))}</b>"
-        f"<small>{text(today)} with the brakes closed, {text(then)} in {idle.mode}</small>"
-        f"<small>{idle.basis}</small>"
-    )
+    ends = span_of_money(idle.money, costs.currency)
+    small = f"<small>{text(ends)}</small>" if ends else ""
+    return f"<b>{text(money_of(idle.money, costs.currency))}</b>{small}"
 
 
 def _both(amount: Amount, idle: IdleSaving, costs: Costs) -> str:
@@ -340,7 +364,7 @@ def _cycle(cycle: Production | None) -> str:
     if cycle is None:
         return DASH
     return (
-        f"<b>{kilowatt_hours(cycle.energy)}</b><small>{seconds(cycle.seconds)}</small>"
+        f"<b>{kilowatt_hours(cycle.energy)}</b><small>{seconds(cycle.pace)}</small>"
         f"<small>{text(cycle.name)}</small>"
     )
 
@@ -514,29 +538,71 @@ def _step(result: Share | None, first: float, own: bool) -> str:
 
 
 def _longest(analyses: Sequence[Analysis]) -> float:
-    return max((a.program.whole.seconds for a in analyses if a.program is not None), default=0.0)
+    return max((curve.end for curve in map(_curve, analyses) if curve is not None), default=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Curve:
+    """Power at the mains [W] (N,) over the time [s] (N,) from the start of a program to its end."""
+
+    time: FloatArray
+    watts: FloatArray
+    high: FloatArray
+    end: float
+
+
+def _curve(analysis: Analysis) -> _Curve | None:
+    """That of the program that was driven, else of the planned one; None where neither is known."""
+    power = analysis.recording.power
+    program = analysis.program
+    if program is not None and power is not None and len(power.time) > 1:
+        start = analysis.steps[0].step.start
+        spans = [
+            (result.step.start - start, result.step.end - start)
+            for result in analysis.steps
+            if result.step.movement.is_pause
+        ]
+        whole = _Curve(power.time - start, power.power, power.power, program.whole.seconds)
+        return _cut(whole, spans)
+    side = planned_side(analysis) if analysis.recording.never_driven else None
+    if side is None or not len(side.time):
+        return None
+    return _cut(_Curve(side.time, side.watts, side.high, side.report.duration), rests_of(side))
+
+
+REST = 12.0  # s: longer pauses are drawn so short
+
+
+def _cut(curve: _Curve, pauses: Sequence[tuple[float, float]]) -> _Curve:
+    """The curve with each long pause as long as REST: those of a run may be shortened, and curves
+    beside each other are to be compared.
+    """
+    edges = [0.0]
+    places = [0.0]
+    for begin, end in pauses:
+        if end - begin > REST:
+            first = places[-1] + begin - edges[-1]
+            edges += [begin, end]
+            places += [first, first + REST]
+    shift = places[-1] - edges[-1]
+    time = np.where(
+        curve.time > edges[-1], curve.time + shift, np.interp(curve.time, edges, places)
+    )
+    before = curve.time < 0.0  # what was recorded before the program
+    return replace(curve, time=np.where(before, curve.time, time), end=curve.end + shift)
 
 
 def _powers(analyses: Sequence[Analysis], names: Sequence[str]) -> dict[str, Json]:
     """Mains power from the start of each program on one grid, every peak kept."""
     edges = np.linspace(0.0, _longest(analyses), _POINTS + 1)
-    drawn = [k for k, analysis in enumerate(analyses) if _driven(analysis)]
+    known = [(name, curve) for name, curve in zip(names, map(_curve, analyses), strict=True)]
+    drawn = [(name, curve) for name, curve in known if curve is not None]
     low = np.zeros((_POINTS, len(drawn)))
     high = np.zeros((_POINTS, len(drawn)))
-    for k, analysis in enumerate(analyses[one] for one in drawn):
-        power = analysis.recording.power
-        if power is not None:
-            shape = stretches(edges, power.time - analysis.steps[0].step.start, power.power)
-            low[:, k] = shape.low
-            high[:, k] = shape.high
+    for k, (_, curve) in enumerate(drawn):
+        low[:, k] = stretches(edges, curve.time, curve.watts).low
+        high[:, k] = stretches(edges, curve.time, curve.high).high
     middle = (edges[1:] + edges[:-1]) / 2.0
     curves = Curves("power at the mains", "W", middle, high, low=low)
-    programs = [analyses[k].program for k in drawn]
-    ends = [program.whole.seconds if program is not None else 0.0 for program in programs]
-    return {**packed(curves), "names": [names[k] for k in drawn], "ends": ends}
-
-
-def _driven(analysis: Analysis) -> bool:
-    """Whether there is a curve of power to draw."""
-    power = analysis.recording.power
-    return power is not None and len(power.time) > 1 and bool(analysis.steps)
+    ends: list[Json] = [curve.end for _, curve in drawn]
+    return {**packed(curves), "names": [name for name, _ in drawn], "ends": ends}

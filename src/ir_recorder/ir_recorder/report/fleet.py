@@ -430,8 +430,8 @@ def fleet_html(
     summed = [robot for robot in robots if not robot.drives_only]
     sections = [
         _section("Robots, those that cost most first", _robots(members, robots, prices), "robots"),
-        _section("What to change first", _potential(known, summed, prices), "first"),
-        _section("Month by month: driven and predicted", _months(members)),
+        _section("What could still be saved, at most", _potential(known, summed, prices), "first"),
+        _section("Month by month: driven and predicted", _months(members), "months"),
         _problems([each for each in left_out if DRIVES_ONLY not in each]),  # the table says it
         _all_robots(members, robots, prices),
         folded(_section("Peak, and when nobody works", _around_the_clock(members, robots, prices))),
@@ -490,8 +490,7 @@ def _answer(paid: Paid, robots: Sequence[Robot], costs: Costs) -> Answer:
         result = f"Open whether anything is saved: {result}"
     reached = paid.has_reached
     if reached is not None:
-        of = yearly_money(gain.value, costs.currency)
-        result = f"{reached_of(reached.of(costs.money), of, costs)} a year reached"
+        result = reached_of(reached.of(costs.money), gain, costs)
     saved = year.with_energy(costs)
     before = paid.before_amounts(costs)
     share = (
@@ -642,7 +641,7 @@ def _paid(members: Sequence[Member], costs: Costs) -> Paid:
 
 
 _ROBOT_HEADS = (
-    "robot", ">costs in shifts a year", ">saved a year, predicted", ">saved a year at night",
+    "robot", ">costs in shifts a year", ">reached a year", ">still to save a year",
     "change first",
 )  # fmt: skip
 
@@ -663,7 +662,8 @@ def _robots(members: Sequence[Member], robots: Sequence[Robot], costs: Costs) ->
         name = f"<b>all</b><small>{recordings}</small>"
         rows.append((name, *_sums(summed, members, costs), DASH))
     hint = (
-        "Saved: against the same stations by PTP at full speed, the controller's own timers. "
+        "Reached: saved by the plan that was driven, predicted, against the same stations by PTP "
+        "at full speed with the controller's own timers. Still to save: what nobody did yet. "
         "Small: 90 % intervals, which add up as if all were wrong alike."
     )
     if any(robot.saved is not None and robot.saved.doubt for robot in robots):
@@ -690,8 +690,8 @@ def _robot_row(robot: Robot, members: Sequence[Member], costs: Costs) -> tuple[s
     return (
         f"{text(robot.name)}<small>{text(made)}</small><small>{text(each)}</small>",
         _yearly(robot.yearly, costs),
-        _saved(robot.saved, costs),
-        DASH if idle is None else _money(idle.money, costs),
+        _saved(robot.saved, costs) if robot.driven else DASH,
+        _left([robot], idle, costs),
         text(_first_lever(robot, own, idle, costs)),
     )
 
@@ -713,14 +713,29 @@ def _first_lever(robot: Robot, own: Sequence[Member], idle: IdleSaving | None, c
 
 def _sums(robots: Sequence[Robot], members: Sequence[Member], costs: Costs) -> tuple[str, ...]:
     """Costs, energy and savings of several robots."""
-    saved = [robot.saved for robot in robots if robot.saved is not None]
-    nights = [_idle_saving(_own(members, robot), costs) for robot in robots]
-    night = [idle.money for idle in nights if idle is not None]
+    reached = [robot.saved for robot in robots if robot.driven and robot.saved is not None]
+    known = [member for robot in robots for member in _own(members, robot)]
     return (
         _yearly(sum_of([robot.yearly for robot in robots]), costs),
-        _saved(sum_of(saved) if saved else None, costs),
-        _money(sum_of(night), costs) if night else DASH,
+        _saved(sum_of(reached) if reached else None, costs),
+        _left(robots, _idle_saving(known, costs), costs),
     )
+
+
+def _left(robots: Sequence[Robot], idle: IdleSaving | None, costs: Costs) -> str:
+    """What rest outside of the shifts and plans that nobody drove would save, together and each."""
+    plans = [r.saved for r in robots if not r.driven and r.saved is not None]
+    open_plans = sum_of(plans).of(costs.money) if plans else None
+    parts = []
+    if idle is not None:
+        parts.append((idle.money, "at night"))
+    if open_plans is not None and open_plans.value > 0.0 and not open_plans.doubt:
+        parts.append((open_plans, "by its plan" if len(robots) == 1 else "by plans"))
+    if not parts:
+        return DASH
+    shown = _money(sum_of([money for money, _ in parts]), costs)
+    named = [f"{money_of(money, costs.currency)} {words}" for money, words in parts]
+    return f"{shown}<small>{text(', '.join(named))}</small>"
 
 
 _NAMED = 5  # robots in a sentence
@@ -934,12 +949,12 @@ def _potential(members: Sequence[Member], robots: Sequence[Robot], costs: Costs)
         for price, name, own in found
         if price >= _LITTLE * most
     ]
-    heads = ("what", ">a year, at most", "")
+    heads = ("what", ">a year", "")
     hint = "Upper bounds, each by itself: together they count some joules twice."
     little = [name for price, name, _ in found if price < _LITTLE * most]
     if little:
         hint += f" Less than {100.0 * _LITTLE:g} % of the largest: {', '.join(little)}."
-    return f'{table(heads, rows, "What to change first", COMPACT)}<p class="hint">{hint}</p>'
+    return f'{table(heads, rows, "What could still be saved", COMPACT)}<p class="hint">{hint}</p>'
 
 
 _MORE = 1.05  # times what the next one saves: else none saves most

@@ -52,7 +52,7 @@ def money(value: float, currency: str) -> str:
     """
     if not math.isfinite(value):
         return DASH
-    return f"{_carried('m', (value,), _digits(value), currency)} {currency}"
+    return _carried("m", (value,), f"{_digits(value)} {currency}", currency)
 
 
 def _digits(value: float) -> str:
@@ -69,7 +69,7 @@ def yearly_money(value: float, currency: str) -> str:
         return NEXT_TO_NOTHING
     if not math.isfinite(value):
         return DASH
-    return f"{_carried('y', (value,), _yearly_digits(value), currency)} {currency}"
+    return _carried("y", (value,), f"{_yearly_digits(value)} {currency}", currency)
 
 
 def _yearly_digits(value: float) -> str:
@@ -81,14 +81,14 @@ def money_of(amount: Amount, currency: str) -> str:
     if amount.low < amount.high:
         most = max(abs(amount.low), abs(amount.high))
         shown = whole(amount.value) if most >= NO_CENTS else _yearly_digits(amount.value)
-        return f"{_carried('o', (amount.value, most), shown, currency)} {currency}"
+        return _carried("o", (amount.value, most), f"{shown} {currency}", currency)
     return yearly_money(amount.value, currency)
 
 
 def sum_of_money(amounts: Sequence[float], currency: str) -> str:
     """The sum of amounts of a year as they are shown, each rounded: it adds up on the page."""
     total = together(amounts)
-    return f"{_carried('t', amounts, _yearly_digits(total), currency)} {currency}"
+    return _carried("t", amounts, f"{_yearly_digits(total)} {currency}", currency)
 
 
 def together(amounts: Sequence[float]) -> float:
@@ -118,6 +118,13 @@ def yearly_span(low: float, high: float, currency: str, least: float = NOTHING) 
     return _carried("s", (low, high, least), span_of(low, high, show), currency)
 
 
+def span_of_money(amount: Amount, currency: str) -> str:
+    """The 90 % interval of an amount of a year, with its currency; "" without one."""
+    if amount.low >= amount.high:
+        return ""
+    return f"{yearly_span(amount.low, amount.high, currency)} {currency}"
+
+
 def hours_of(value: float, hour: float, currency: str) -> str:
     """How many hours at a price of their own an amount pays for."""
     return _carried("h", (value / hour,), significant(value / hour, 2), currency)
@@ -125,7 +132,7 @@ def hours_of(value: float, hour: float, currency: str) -> str:
 
 def price_of(value: float, currency: str) -> str:
     """The price of a kilowatt-hour, with its currency."""
-    return f"{_carried('p', (value,), f'{value:g}', currency)} {currency}/kWh"
+    return _carried("p", (value,), f"{value:g} {currency}/kWh", currency)
 
 
 def price_field(value: float, currency: str) -> str:

@@ -105,8 +105,7 @@ class Paid:
         if reached is not None and reached.value >= gain.value:
             result = f"{yearly_money(gain.value, costs.currency)} {less} a year: reached"
         elif reached is not None:
-            of = yearly_money(gain.value, costs.currency)
-            result = f"{reached_of(reached.of(costs.money), of, costs)} a year reached"
+            result = reached_of(reached.of(costs.money), gain, costs)
         words = "; ".join(each for each in said if each)
         own = first_steps(steps, None, costs)
         nights = first_steps((), self.idle, costs)
@@ -175,7 +174,7 @@ class Paid:
         shifts = self.before_amounts(costs)[0], costs.money(self.common - self.saved.value)
         rows = [
             _year_row(self.before, "today", (shifts[0], nights[0]), costs),
-            _year_row(PLANNED, "planned", (shifts[1], nights[1]), costs),
+            _year_row(planned_name(self.before), "planned", (shifts[1], nights[1]), costs),
         ]
         if self.driven is not None:
             name, energy = self.driven
@@ -212,13 +211,18 @@ class Paid:
         return saved_year(self.saved or Amount(0.0, 0.0, 0.0), self.idle, costs)
 
 
+def planned_name(before: str) -> str:
+    """What a year of the plan is called beside what it is held against."""
+    return f"{PLANNED}s" if before.endswith("programs") else PLANNED
+
+
 KEEP = "Keep the program as it is."
 
 
-def reached_of(reached: Amount, whole: str, costs: Costs) -> str:
-    """How much of a saving was driven, in money: "106 of 323 EUR"."""
-    shown = yearly_money(reached.value, costs.currency)
-    return f"{shown.removesuffix(f' {costs.currency}')} of {whole}"
+def reached_of(reached: Amount, gain: Amount, costs: Costs) -> str:
+    """How much of a saving was driven, in money: "106 EUR of 323 EUR a year reached"."""
+    shown, of = (yearly_money(each.value, costs.currency) for each in (reached, gain))
+    return f"{shown} of {of} a year reached"
 
 
 def counted_at(costs: Costs) -> str:

@@ -566,9 +566,11 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
         "rests": long_rests([rests_of(side) for side in there]),
     }
     parts = {
-        "title": text(f"{cell.name}: {program_before(found)} and {PLANNED}"),
+        "title": text(f"{cell.name}: what the plan saves"),
         "subtitle": text(
-            f"{found.name} ({found.kind}) against what the planner makes of the same stops"
+            f"{PLANNED} against {program_before(found)} ({found.name}, {found.kind}), same stops"
+            if found.kind != COMMON
+            else f"{PLANNED} against {COMMON} ({found.name}), same stops"
         ),
         "problems": _problems(found, cell),
         "proof": _badge(found),

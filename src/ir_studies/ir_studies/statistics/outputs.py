@@ -381,11 +381,10 @@ def _answer(found: Findings) -> Answer | None:
         return Answer(_timings(found), "", _SCOPE) if found.solved > found.same else None
     each = _against_direct(found)
     assert each is not None
-    sure = f"Over {counted(each.pairs, 'pair')} of places. {_SCOPE}"
-    if math.isfinite(each.mean.low):
-        sure = f"90 % interval {_interval(each.mean)} %. {sure}"
+    sure = [f"Over {counted(each.pairs, 'pair')} of places.", _SCOPE]
     if found.solved < found.pairs:
-        sure += f" {found.pairs - found.solved} of {found.pairs} pairs could not be planned."
+        sure.append(f"{found.pairs - found.solved} of {found.pairs} pairs could not be planned.")
+    between = f"90 % interval {_interval(each.mean)} %" if math.isfinite(each.mean.low) else ""
     advice = []
     if each.outside:
         factor = 1.0 / (1.0 + 0.01 * each.mean.value)
@@ -395,7 +394,26 @@ def _answer(found: Findings) -> Answer | None:
         )
     if not any(one.shown for one in found.comparisons):
         advice.append("Take either timing: neither is shown to be better.")
-    return Answer(result, f"{words} {_timings(found)}.", sure, " ".join(advice))
+    return Answer(
+        result, f"{words} {_timings(found)}.", sure, advice, _in_money(each.mean), between
+    )
+
+
+def _in_money(off: Mean) -> list[str]:
+    """What a predicted cost of 100 EUR is on the meter."""
+    if abs(off.value) < ALIKE:
+        return []
+
+    def on_the_meter(percent_off: float) -> float:
+        return 100.0 / (1.0 + 0.01 * percent_off)
+
+    low, high = sorted(map(on_the_meter, (off.low, off.high)))
+    ends = f" (90 % interval {low:.2f} to {high:.2f} EUR)" if math.isfinite(off.low) else ""
+    return [
+        f"Where a page predicts 100 EUR, the meter of such a robot counts "
+        f"{on_the_meter(off.value):.2f} EUR{ends}.",
+        "What a plan saves changes by the same share, as both of its programs do.",
+    ]
 
 
 def _verdict(found: Findings) -> tuple[str, bool]:

@@ -44,7 +44,10 @@ function priceField() {
     field.setAttribute("aria-invalid", String(!good));
     if (!good) return;
     document.documentElement.classList.toggle("repriced", typed !== first);
-    amounts.forEach((each, k) => { each.textContent = typed === first ? before[k] : typesetWords(Amounts(each.getAttribute("value"), typed / first)); });
+    amounts.forEach((each, k) => {
+      const unit = before[k].replace(/^.*\d/, ""); /* what stands behind the number */
+      each.textContent = typed === first ? before[k] : typesetWords(Amounts(each.getAttribute("value"), typed / first)) + unit;
+    });
   };
   field.addEventListener("input", show);
   show(); /* what a browser restored */
