@@ -71,7 +71,7 @@ def test_the_answer_names_the_program_that_costs_least(analysis: Analysis, other
     assert "<li>Drive demo.</li>" in page
     assert "<li>Hibernation" in page  # what nights save is not forgotten
     assert "<b>demo costs least</b>" in page_of(analysis, other)
-    assert "<p>Keep demo.</p>" in page_of(analysis, other)
+    assert "<li>Keep demo.</li>" in page_of(analysis, other)
     alike = page_of(analysis, analyse(replace(analysis.recording, path=Path("again.mcap"))))
     assert "<b>None is shown to cost less than demo</b>" in alike
 

@@ -336,9 +336,9 @@ def test_a_fleet_counts_the_same_robots_in_shifts_and_at_night(analysis: Analysi
     driven = picture.partition("these files, as driven")[2]
     assert f"{yearly_money(nights, 'EUR')} outside" in driven  # nobody recorded a night
     assert "of it from nights, by the data sheet" in page
-    assert "Go on driving the plan of first instead of its common program" in page
+    assert "The plan of first instead of its common program" in page
     assert "the 576 h a year (15 % of the shifts) in which the cell stands still" in page
-    measures = page.split("<h2>What to change first")[1].partition("</section>")[0]
+    measures = page.split("<h2>What could still be saved, at most")[1].partition("</section>")[0]
     assert "at night and at weekends<small>hibernation" in measures
     assert yearly_money(2.0 * idle.saved, "EUR") in measures
 

@@ -13,6 +13,7 @@ from mcap_ros2.decoder import DecoderFactory
 
 from ir_msgs_py.report import DistancePair, PlannedMovement, TrajectoryReport
 from ir_msgs_py.savings import ProgramSavings, Saving
+from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.format.schemas import definitions_of
 from ir_recorder.reading.cdr import Columns
 from ir_recorder.reading.mcap_file import RawChannel
@@ -62,6 +63,27 @@ def movement_from(message: Any) -> PlannedMovement:
         wait_for=tuple(message.wait_for),
         set_signals=tuple(message.set_signals),
         since=getattr(message, "since", ""),  # older recordings have none
+    )
+
+
+def trajectory_from(message: Any) -> JointTrajectory:
+    """A JointTrajectory of its decoded message, without its efforts; an IrError where it makes no
+    sense.
+    """
+    times = [
+        point.time_from_start.sec * 1_000_000_000 + point.time_from_start.nanosec
+        for point in message.points
+    ]
+    positions, velocities, accelerations = (
+        [list(getattr(point, name)) for point in message.points]
+        for name in ("positions", "velocities", "accelerations")
+    )
+    return JointTrajectory(
+        tuple(message.joint_names),
+        np.array(times, dtype=np.int64),
+        np.array(positions, dtype=np.float64),
+        np.array(velocities, dtype=np.float64) if all(velocities) else None,
+        np.array(accelerations, dtype=np.float64) if all(accelerations) else None,
     )
 
 

@@ -23,6 +23,7 @@ from ir_msgs_py.search_log import (
     Track,
     WithdrawalLog,
 )
+from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.errors import ReadError, SchemaError
 from ir_recorder.format.schemas import SEPARATOR, SchemaLibrary, fields_of, installed_prefixes
 from ir_recorder.reading.cdr import Columns
@@ -185,6 +186,25 @@ def planned_program(
             certified = float(columns.numbers("report.certified")[0]) == 1.0
             return steps, (low, high) if high > low else None, certified
     return (), None, False
+
+
+def with_trajectories(
+    steps: Sequence[PlannedMovement], known: Sequence[JointTrajectory]
+) -> tuple[PlannedMovement, ...]:
+    """The steps with the trajectories that were published of them, in their order; as they are
+    where those aren't one of each movement, as long as it.
+    """
+    moving = [step for step in steps if not step.is_pause]
+    alike = len(moving) == len(known) and all(
+        abs(step.duration - one.duration) < _ALIKE for step, one in zip(moving, known, strict=True)
+    )
+    if not alike:
+        return tuple(steps)
+    left = iter(known)
+    return tuple(step if step.is_pause else replace(step, trajectory=next(left)) for step in steps)
+
+
+_ALIKE = 1e-6  # s
 
 
 def _steps_of(columns: Columns) -> tuple[PlannedMovement, ...]:

@@ -14,6 +14,7 @@ import numpy as np
 from ir_msgs_py import names
 from ir_msgs_py.names import owns_diagnostic, owns_logger
 from ir_msgs_py.plc import PlcInputs, PlcOutputs
+from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.errors import ReadError
 from ir_recorder.format import contents
 from ir_recorder.reading.bag_file import read_bag_file
@@ -27,8 +28,14 @@ from ir_recorder.reading.cdr import (
 )
 from ir_recorder.reading.chunk_limits import ReadLimits
 from ir_recorder.reading.mcap_file import RawChannel, RawRecording, chosen_namespace, read_raw
-from ir_recorder.reading.messages import contact_sentence, decoder_of, movement_from, savings_from
-from ir_recorder.reading.planner_answers import planned_program, with_plans
+from ir_recorder.reading.messages import (
+    contact_sentence,
+    decoder_of,
+    movement_from,
+    savings_from,
+    trajectory_from,
+)
+from ir_recorder.reading.planner_answers import planned_program, with_plans, with_trajectories
 from ir_recorder.reading.recording import (
     BitSeries,
     ControllerSeries,
@@ -92,6 +99,7 @@ TYPES = {
     names.PLC_OUTPUTS: "ir_msgs/msg/PlcOutputs",
     names.PROGRAM_STATE: "ir_msgs/msg/ProgramState",
     names.PROGRAM_SAVINGS: "ir_msgs/msg/ProgramSavings",
+    names.PLANNED_TRAJECTORY: "trajectory_msgs/msg/JointTrajectory",
     names.MACHINE_STATES: "ir_msgs/msg/MachineStates",
     names.CONTACTS: "ir_msgs/msg/Contact",
     names.SIGNALS: "ir_msgs/msg/Signal",
@@ -202,7 +210,7 @@ class _SeriesReader:
             return found
         return replace(
             found,
-            planned=planned,
+            planned=with_trajectories(planned, tuple(self._trajectories())),
             planned_interval=interval,
             planned_certified=certified,
             problems=kept,
@@ -428,6 +436,14 @@ class _SeriesReader:
         return self._values(
             names.MACHINE_STATES, lambda time, message: machine_states([(time, message)])
         )
+
+    def _trajectories(self) -> Iterator[JointTrajectory]:
+        """What a planner published of its movements, in their order."""
+
+        def of(_: float, message: Any) -> Iterator[JointTrajectory]:
+            yield trajectory_from(message)
+
+        return self._values(names.PLANNED_TRAJECTORY, of)
 
     def _savings(self) -> Iterator[SavingsEvent]:
         def of(time: float, message: Any) -> Iterator[SavingsEvent]:

@@ -102,9 +102,7 @@ class Paid:
         if self.saved is not None and self.saved.doubt:
             result = f"Open whether anything is saved: {result}"
         reached = self.has_reached
-        if reached is not None and reached.value >= gain.value:
-            result = f"{yearly_money(gain.value, costs.currency)} {less} a year: reached"
-        elif reached is not None:
+        if reached is not None:
             result = reached_of(reached.of(costs.money), gain, costs)
         words = "; ".join(each for each in said if each)
         own = first_steps(steps, None, costs)
@@ -222,6 +220,8 @@ KEEP = "Keep the program as it is."
 def reached_of(reached: Amount, gain: Amount, costs: Costs) -> str:
     """How much of a saving was driven, in money: "106 EUR of 323 EUR a year reached"."""
     shown, of = (yearly_money(each.value, costs.currency) for each in (reached, gain))
+    if gain.value - reached.value < NOTHING:
+        return f"{of} less a year: reached"
     return f"{shown} of {of} a year reached"
 
 
