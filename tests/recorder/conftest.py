@@ -422,7 +422,9 @@ def tending_parts(analysis: Analysis) -> Analysis:
     middle = 0.5 * (whole.begin + whole.end)
     halves = (Span(whole.begin, middle), Span(middle, whole.end))
     assert analysis.program is not None
-    each = 0.5 * analysis.program.whole.energy
+    power = analysis.recording.power
+    assert power is not None
+    ends = np.interp([whole.begin, middle, whole.end], power.time, power.energy)
     parts = tuple(
         PartRow(
             k,
@@ -434,7 +436,7 @@ def tending_parts(analysis: Analysis) -> Analysis:
             {"lathe": 0.2} if k == 2 else {},
             {"lathe": 0.3, "machine_with_a_long_name": 0.1},
         )
-        for k, half in enumerate(halves, start=1)
+        for k, (half, each) in enumerate(zip(halves, np.diff(ends).tolist(), strict=True), start=1)
     )
     steps = tuple(
         TendedStep(

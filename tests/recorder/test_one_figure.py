@@ -5,6 +5,7 @@ and in every table, whatever a recording holds and costs are given.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +23,7 @@ from ir_recorder.analysis.predicted_power import (
     recorded_power_data,
     resting_watts,
 )
-from ir_recorder.analysis.production import levers, production_of
+from ir_recorder.analysis.production import demand_watts, levers, production_of, stretches
 from ir_recorder.analysis.results import FullPause
 from ir_recorder.report import report_html
 from ir_recorder.report.compare import comparison_html
@@ -86,6 +87,25 @@ def test_modes_and_steps_are_parts_of_the_cycle(found: Analysis) -> None:
     assert sum(sum(own.values()) for own in years.values()) == pytest.approx(robot.yearly.value)
     columns = fleet_columns([member])
     assert columns["energy_j"][0] == cycle.energy
+
+
+def test_the_largest_quarter_of_an_hour_takes_no_less_than_the_mean(
+    found: Analysis, tended: Callable[[Analysis], Analysis]
+) -> None:
+    """Once a part took 763 W on average and its largest quarter of an hour 724 W: that was of the
+    whole run, in which the line was empty first.
+    """
+    for run in (found, tended(found)):
+        cycle = production_of(run)
+        assert cycle is not None
+        rows = stretches(run)
+        seconds, joules = (sum(column) for column in zip(*rows, strict=True))
+        if run.tending is None:
+            assert seconds == pytest.approx(cycle.seconds * cycle.cycles)
+        mean = cycle.energy / cycle.seconds
+        assert joules / seconds == pytest.approx(mean)
+        most = max(energy / time for time, energy in rows)
+        assert (1.0 - 1e-9) * mean <= demand_watts(run, cycle) <= (1.0 + 1e-9) * most
 
 
 def test_full_pauses_save_within_the_interval_of_drawn_robots(found: Analysis) -> None:

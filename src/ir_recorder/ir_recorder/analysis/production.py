@@ -447,7 +447,8 @@ def stretches(analysis: Analysis) -> list[tuple[float, float]]:
         return []
     span = _counted(analysis)
     meter = Meter(power)
-    longer = {pause.step: pause for pause in _added(analysis.program)}
+    added = _added(analysis.program) if analysis.tending is None else ()
+    longer = {pause.step: pause for pause in added}
     rows = []
     turn = span.begin
     for place, result in enumerate(analysis.steps):

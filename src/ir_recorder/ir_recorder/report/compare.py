@@ -138,7 +138,8 @@ def _answer(analyses: Sequence[Analysis], names: Sequence[str], costs: Costs) ->
     """
     cycles = [production_of(analysis) for analysis in analyses]
     if _apart(analyses):
-        return Answer("Nothing to hold against another", "They are of different cells.")
+        words = "They are of different cells."
+        return Answer("Nothing to hold against another", words, counted=counted_at(costs))
     known = {
         name: costs.energy_of_year(cycle).of(costs.money)
         for name, cycle in zip(names, cycles, strict=True)
@@ -147,7 +148,7 @@ def _answer(analyses: Sequence[Analysis], names: Sequence[str], costs: Costs) ->
     alike = len({cycle.drives_only for cycle in cycles if cycle is not None}) == 1
     if len(known) < len(cycles) or not alike:
         why = "What a year costs is not known of each, or not of the same supply."
-        return Answer("No program is shown to cost least", why)
+        return Answer("No program is shown to cost least", why, counted=counted_at(costs))
     first = known[names[0]]
     least = min(known, key=lambda name: known[name].value)
     said = [f"{name} {yearly_money(known[name].value, costs.currency)}" for name in names[:_NAMED]]
