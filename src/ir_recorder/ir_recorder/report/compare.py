@@ -568,7 +568,7 @@ def _curve(analysis: Analysis) -> _Curve | None:
     side = planned_side(analysis) if analysis.recording.never_driven else None
     if side is None or not len(side.time):
         return None
-    return _cut(_Curve(side.time, side.watts, side.high, side.report.duration), rests_of(side))
+    return _cut(_Curve(side.time, side.watts, side.high, side.report.duration), rests_of(side)[:-1])
 
 
 REST = 12.0  # s: longer pauses are drawn so short

@@ -140,7 +140,7 @@ def price_field(value: float, currency: str) -> str:
     follow it the price in words.
     """
     if not isinstance(currency, Repriced):
-        return text(price_of(value, currency))
+        return f"Electricity at {text(price_of(value, currency))}"
     return (
         f'<label>Electricity at <input id="price" type="text" inputmode="decimal" size="5" '
         f'value="{value:g}" data-price="{value!r}" autocomplete="off"> {text(currency)}/kWh</label>'

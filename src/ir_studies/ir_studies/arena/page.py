@@ -309,18 +309,21 @@ def _answer(
         return Answer("Nobody wins", "No planner solved any run.")
     best = ranking.found[ranking.winner]
     words = (
-        f"Of {counted(len(settings.planners), 'planner')} with {settings.seconds:g} s of processor "
-        f"for each of {counted(ranking.questions, 'movement')} {best.planner} solved most, "
-        f"{best.solved} of {best.count} runs, and of those that solved as many its trajectories "
-        f"cost least, {100.0 * (best.cost_ratio - 1.0):.2f} % above the best known in the median. "
-        f"Its median movement takes {seconds(best.duration)} and {joules(best.energy)}: 1 % of "
-        f"the energy is {joules(0.01 * best.energy)}."
+        f"{best.planner} solved most, {best.solved} of {best.count} runs, and of those that solved "
+        f"as many its trajectories cost least: {100.0 * (best.cost_ratio - 1.0):.2f} % above the "
+        f"best known in the median. {counted(len(settings.planners), 'planner')} had "
+        f"{settings.seconds:g} s of processor for each of "
+        f"{counted(ranking.questions, 'movement')}."
     )
     return Answer(
         _result(ranking),
         words,
         _sure(ranking, runs, settings, missing),
         _to_do(ranking, runs, settings),
+        [
+            f"The median movement takes {seconds(best.duration)} and {joules(best.energy)}; 1 % of "
+            f"it is {joules(0.01 * best.energy)}."
+        ],
     )
 
 
@@ -338,22 +341,24 @@ def _result(ranking: _Ranking) -> str:
 
 def _sure(
     ranking: _Ranking, runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int
-) -> str:
+) -> list[str]:
     """Which others are shown to be worse, and which are not."""
     if not ranking.others:
-        return "There is nobody to compare with."
+        return ["There is nobody to compare with."]
     alike = [other.planner for other in ranking.others if not _differs(other)]
     differ = [other.planner for other in ranking.others if _differs(other)]
     named = f": {', '.join(differ)}" if differ else ""
-    said = f"{len(differ)} of the {len(ranking.others)} others are shown to differ{named}."
+    said = [f"{len(differ)} of the {len(ranking.others)} others are shown to differ{named}."]
     if missing:
         without = _without(runs, settings)
         none = f", none of {', '.join(without)}" if without else ""
-        said = f"Not finished: {len(runs)} of {len(runs) + missing} runs{none}. {said}"
+        said.insert(0, f"Not finished: {len(runs)} of {len(runs) + missing} runs{none}.")
     if alike:
-        said += f" No difference of {_TIE:.1%} is shown to {', '.join(alike)}.".replace("%", " %")
+        said.append(
+            f"No difference of {_TIE:.1%} is shown to {', '.join(alike)}.".replace("%", " %")
+        )
     if _judged(settings) and not behind(runs, settings):
-        said += f" In no cell is anybody shown to be ahead of the {PORTFOLIO}."
+        said.append(f"In no cell is anybody shown to be ahead of the {PORTFOLIO}.")
     return said
 
 

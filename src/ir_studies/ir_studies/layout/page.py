@@ -32,7 +32,7 @@ from ir_recorder.report.number_text import (
     text,
 )
 from ir_recorder.report.page import PAGE_START
-from ir_recorder.report.paid import Tile, row_of
+from ir_recorder.report.paid import Tile, between_of, counted_at, row_of
 from ir_recorder.report.shapes import body_mesh, capsule_mesh
 from ir_recorder.report.step_table import write_columns
 from ir_recorder.report.tables import table
@@ -350,25 +350,31 @@ def _answer(
         f"{kilowatt_hours(like.mean())} at the mains a cycle, pauses included ({share}); the "
         f"movements alone take {moved}."
     )
-    ends_of = yearly_span(year.money.low, year.money.high, costs.currency)
-    sure = (
-        f"90 % interval {ends_of} {costs.currency}, of the robot's data alone; "
-        f"{_between_seeds(one)}. {_at_limits(one, settings)}Predicted, not driven."
-    )
+    between = between_of(year.money, costs)
+    seeds = _between_seeds(one)
+    sure = [
+        "Predicted, not driven; the interval is of the robot's data alone.",
+        f"{seeds[0].upper()}{seeds[1:]}.",
+        _at_limits(one, settings).strip(),
+    ]
+    sure = [each for each in sure if each]
+    rests_on = counted_at(costs)
     if year.money.value <= 0.0 or year.money.low <= 0.0:
         result = "No placement is shown to save"
-        return Answer(result, "", sure, "Leave everything where it stands.")
+        do = "Leave everything where it stands."
+        return Answer(result, "", sure, do, between=between, counted=rests_on)
     price = yearly_money(year.money.value, costs.currency)
     if year.money.value < costs.engineer_hour:
         hour = f"{costs.engineer_hour:g} {costs.currency}"
         do = f"Leave everything where it stands: less than one hour of an engineer ({hour})."
-        return Answer(f"Not worth moving: {price} a year at best", words, sure, do)
+        result = f"Not worth moving: {price} a year"
+        return Answer(result, words, sure, do, between=between, counted=rests_on)
     result = f"{price} less a year"
     do = (
         f"Move: that {payback(year.money, costs)}. Plan best_1.yaml, and look at cables, ways of "
         "people and how parts come, which no study knows."
     )
-    return Answer(result, words, sure, do)
+    return Answer(result, words, sure, do, between=between, counted=rests_on)
 
 
 def _verdict(finals: Sequence[Sequence[Final]], costs: Costs) -> tuple[str, bool]:
@@ -464,7 +470,7 @@ def _bars(finals: Sequence[Sequence[Final]], costs: Costs) -> str:
             rows.append(
                 Row(
                     name if len(own) == 1 else f"{name}, {one.condition.text}",
-                    (Piece(style, price, year.money.value),),
+                    (Piece(style, name, year.money.value),),
                     price,
                     notes,
                     whisker=(year.money.low, year.money.high),

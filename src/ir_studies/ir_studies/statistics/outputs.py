@@ -330,7 +330,7 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
     varied = [each for each in found.comparisons if not each.count or each.less + each.more]
     same = [each.name for each in found.comparisons if each not in varied]
     head = Head(
-        "Statistics",
+        "Predicted energies, held against a meter",
         f"{settings.cell}: {found.pairs} random pairs of places, planner "
         f"{settings.planner or 'portfolio'}, objective {settings.objective.replace('_', ' ')}, "
         f"{_robot(settings)}",
@@ -496,16 +496,16 @@ def _tiles(found: Findings) -> list[Tile]:
     """
     compared = found.solved - found.same
     both = f"{found.solved} with both timings certified"
-    tiles = [Tile("pairs compared", f"{compared} of {found.pairs}", (both,))]
+    tiles = []
     timing = "asynchronous against synchronous"
-    for each in (*found.comparisons, *found.agreements):
+    for each in (*found.agreements, *found.comparisons):
         if not math.isfinite(each.mean.value) or each.name not in _FIRST:
             continue
         within = f"90 % interval {_interval(each.mean)} %" if math.isfinite(each.mean.low) else ""
         of = timing if each in found.comparisons else "of a movement's energy"
         verdict = "" if each.shown else "not shown once all rows count together (Holm)"
         tiles.append(Tile(each.name, f"{percent(each.mean.value)} %", (within, of, verdict)))
-    return tiles
+    return [*tiles, Tile("pairs compared", f"{compared} of {found.pairs}", (both,))]
 
 
 def summed_up(found: Findings) -> str:

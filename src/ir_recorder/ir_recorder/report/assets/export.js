@@ -131,7 +131,7 @@ function exportButtons() {
 }
 
 /* On a telephone: what comes after the answer opens when its heading is chosen; curves and pictures stay. Paper has what a desk has. */
-const FIRST = ["answer", "year"];
+const FIRST = ["answer", "year", "moved", "measurements", "ranking"];
 function foldOnPhones(kept) {
   if (!matchMedia("(max-width: 700px)").matches) return;
   for (const section of document.querySelectorAll("main > section[id]")) {
