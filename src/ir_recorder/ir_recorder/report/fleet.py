@@ -511,7 +511,7 @@ def _answer(paid: Paid, robots: Sequence[Robot], costs: Costs) -> Answer:
         paid.sure(costs),
         todo or ["Keep the programs as they are."],
         a_night(paid.idle, costs),
-        between_of(gain, costs),
+        f"{'' if reached is None else 'together '}{between_of(gain, costs)}",
         done,
         counted_at(costs),
     )
@@ -701,7 +701,8 @@ def _first_lever(robot: Robot, own: Sequence[Member], idle: IdleSaving | None, c
     found: list[tuple[float, str]] = []
     if idle is not None:
         found.append((idle.saved, f"{idle.mode} at night"))
-    if robot.saved is not None and robot.saved.value > 0.0 and not robot.saved.doubt:
+    saves = robot.saved is not None and robot.saved.value > 0.0 and not robot.saved.doubt
+    if robot.saved is not None and saves and not robot.driven:
         found.append((costs.money(robot.saved.value), "drive its plan"))
     if robot.saved is None:
         found += [

@@ -113,7 +113,7 @@ class Paid:
             self.sure(costs),
             nights if reached is not None else first_steps(steps, self.idle, costs) or KEEP,
             [*_of_parts(part, costs), *a_night(self.idle, costs)],
-            between_of(gain, costs),
+            f"{'' if reached is None else 'together '}{between_of(gain, costs)}",
             own if reached is not None else (),
             counted_at(costs),
         )
