@@ -109,7 +109,7 @@ def _parts(tending: Tending) -> str:
 
 def _waits(waits: Mapping[str, float]) -> str:
     said = [f"{text(name)} {seconds(value)}" for name, value in waits.items()]
-    return "<br>".join(said) or DASH
+    return ", ".join(said) or DASH
 
 
 _PLANNED = {
