@@ -175,12 +175,18 @@ OPTIONS = [field.name for field in fields(PlanOptions)]
 
 
 def asked(call: Callable[..., Any], arguments: dict[str, Any]) -> str:
-    """The sentence that refuses a call, "" where it is answered."""
+    """The sentence that refuses a call, "" where it is answered. Requests to a planner are refused
+    with its own error alone, but for a cell that can't be read.
+    """
+    of_planner = isinstance(getattr(call, "__self__", None), Planner)
+    expected = (
+        PlannerError if of_planner and call.__name__ != "set_cell" else (PlannerError, IrError)
+    )
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             call(**arguments)
-    except (PlannerError, IrError) as error:
+    except expected as error:
         return str(error) or "no sentence"
     return ""
 

@@ -14,6 +14,7 @@ from ir_planner.errors import RequestError, unknown_name
 from ir_planner.program import Doors
 from ir_planner.scene import Drives, PlanningScene, load_text, scene_with
 from ir_values.arrays import FloatArray
+from ir_values.errors import InvalidValueError, PoseError, UnknownNameError
 
 
 class DriverReports:
@@ -146,7 +147,15 @@ class CurrentCell:
             cell = self.cell
             if name not in [machine.name for machine in cell.equipment]:
                 raise unknown_name("equipment", name, (machine.name for machine in cell.equipment))
-            return self._replaced_by(cell.with_equipment(name, pose, enabled, state or None))
+            try:
+                changed = cell.with_equipment(name, pose, enabled, state or None)
+            except UnknownNameError as error:
+                raise RequestError(StatusCode.INVALID_OBJECT_NAME, str(error)) from error
+            except PoseError as error:
+                raise RequestError(StatusCode(error.code), str(error)) from error
+            except InvalidValueError as error:
+                raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, str(error)) from error
+            return self._replaced_by(changed)
 
     def hash_of(self, cell: Cell) -> str:
         """Content hash of a cell; of the same one made once."""

@@ -287,8 +287,8 @@ class Planner:
         checked_margin(safety_distance)
         bounded(starts, 1, STARTS_MAX, "starts")
         here = self._configuration(near, "near", StatusCode.INVALID_ROBOT_STATE)
+        options = options_with(None, {"safety_distance": safety_distance, "seed": seed})
         journal = Journal(self._work(PlanOptions(), _NEVER), seed, planner_id=method)
-        options = PlanOptions(safety_distance=safety_distance, seed=seed)
         context = Context(self.scene(load), options, journal)
         return configurations_at(self._goal(goal), here, context, starts, self.settings.interaction)
 
@@ -529,6 +529,9 @@ class Planner:
         """
         options, note = checked_path_options(options_with(options, changes))
         scene = self.scene(options.load)
+        known = [one.name for one in scene.cell.paths]
+        if isinstance(path, str) and path not in known:
+            raise unknown_name("path", path, known)
         drawn_path = scene.cell.path(path) if isinstance(path, str) else path
         name, segments = (
             (drawn_path.name, drawn_path.path)
