@@ -2,10 +2,12 @@
 
 Between the points the spline is free to swing; where that is not free, the points are joined by
 straight movements that stop at each. Where no times are given, the spline's path stays and its time
-scaling becomes the best: fastest, or as the objective and the requested duration ask for. What
-violates a limit or a clearance is named with the first violation.
+scaling becomes the best: fastest, or as the objective and the requested duration ask for; few
+points are stopped at where that costs less. What violates a limit or a clearance is named with the
+first violation.
 """
 
+import functools
 import itertools
 from dataclasses import dataclass, replace
 
@@ -14,6 +16,7 @@ import numpy as np
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.status import Status, StatusCode
+from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import FreeSpace, end_in_collision
 from ir_planner.errors import RequestError, TimingError, unfit
 from ir_planner.optimize import rescaled
@@ -38,6 +41,7 @@ from ir_values.argument_types import typed_methods
 from ir_values.arrays import FloatArray
 
 POINTS_MAX = 1000
+_FEW = 60  # points that are stopped at where that costs less than a spline
 _AT_STOPS = ("clearance", "position")  # violations that straight steps avoid
 
 
@@ -132,20 +136,53 @@ def _followed(reference: Reference, context: Context) -> Movement:
         with journal.stage("ptp"):
             journal.planner_id = "ptp"
             return _ptp(points, reference, context)
+    timed = reference.times is not None and len(points) == len(reference.points)
+    rival = None if timed or len(points) > _FEW else _certified_stops(points, context)
     with journal.stage("spline") as notes:
         journal.planner_id = "spline"
-        if reference.times is not None and len(points) == len(reference.points):
-            movement = _in_proportion(points, np.diff(reference.times), context)
+        try:
+            smooth = _smooth(points, reference.times if timed else None, context, notes)
+        except (TimingError, RequestError) as error:
+            if rival is None:
+                raise
+            notes.append(str(error))
         else:
-            movement = best_along(points, context, notes)
-        violation = movement.prove().violation
-        if violation is None or violation.what not in _AT_STOPS:
-            return movement
-        notes.append(violation.sentence)
+            violation = smooth.prove().violation
+            if violation is not None and violation.what in _AT_STOPS:
+                notes.append(violation.sentence)
+            elif violation is not None or rival is None or smooth.cost <= rival.cost:
+                return smooth
     with journal.stage("stops") as notes:
         journal.planner_id = "stops"
         notes.append("straight between the points, stopping at each")
-        return _stopping(points, context)
+        return rival or _stopping(points, context)
+
+
+def _smooth(
+    points: FloatArray, times: FloatArray | None, context: Context, notes: list[str]
+) -> Movement:
+    """The spline through the points, at times (M,) or timed as is best. Raises TimingError,
+    RequestError.
+    """
+    if times is None:
+        return best_along(points, context, notes)
+    return _in_proportion(points, np.diff(times), context)
+
+
+def _certified_stops(points: FloatArray, context: Context) -> Movement | None:
+    """The movement that stops at each point, each part as fast as is best; None where it isn't
+    certified.
+    """
+    try:
+        if context.options.duration > 0.0:
+            stopping = _stopping(points, context)
+        else:
+            parts = [straight_steps(np.array(pair), context) for pair in itertools.pairwise(points)]
+            joined = functools.reduce(JointTrajectory.then, (part.trajectory for part in parts))
+            stopping = Movement(points, joined, context)
+    except (TimingError, RequestError):
+        return None
+    return stopping if stopping.prove().certified else None
 
 
 def _ptp(points: FloatArray, reference: Reference, context: Context) -> Movement:
