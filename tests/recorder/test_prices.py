@@ -113,3 +113,45 @@ def test_marks_change_no_text(seed: int) -> None:
             assert marked == f'<i title="{show(value, "EUR")}"></i>'
             element = with_elements(f"<b>{show(value, Repriced('EUR'))}</b>")
             assert re.sub(r"</?data[^>]*>", "", element) == f"<b>{show(value, 'EUR')}</b>"
+
+
+def rows_of(page: str) -> dict[str, float]:
+    """What a year's bars carry beside their names."""
+    year = page.split('<section id="year">')[1].partition("</section>")[0]
+    rows = re.findall(r'class="label">(.*?)</span>.*?<b><data value="[a-z]:([^"]*)"', year)
+    return {name: sum(map(float, values.split(","))) for name, values in rows}
+
+
+@pytest.mark.parametrize("made", [report, fleet])
+def test_what_is_reached_and_what_is_left_are_what_is_saved(
+    analysis: Analysis, made: Callable[[Analysis, Costs], str]
+) -> None:
+    """Of a driven plan nothing is asked for twice, and nothing is left out."""
+    page = made(analysis, Costs())
+    rows = rows_of(page)
+    answer = page.split('<section id="answer">')[1].partition("</section>")[0]
+    reached, whole = (
+        float(value) for value in re.findall(r'value="y:([^"]*)"', answer.partition("</b>")[0])
+    )
+    before = next(energy for name, energy in rows.items() if name.startswith("common program"))
+    planned = next(energy for name, energy in rows.items() if name.startswith("planned program"))
+    assert rows["reached"] == pytest.approx(reached)
+    assert rows["reached"] + rows["still to save"] == pytest.approx(whole)
+    assert before - planned == pytest.approx(whole)
+    done, left = answer.partition("Reached")[2].split("Still to save")
+    assert "ibernation" in left
+    assert "ibernation" not in done
+
+
+def test_a_year_without_a_comparison_counts_nights(analysis: Analysis) -> None:
+    alone = replace(analysis, recording=replace(analysis.recording, savings=()))
+    for made in (report, robots):
+        page = made(alone, Costs())
+        rows = rows_of(page)
+        answer = page.split('<section id="answer">')[1].partition("</section>")[0]
+        (whole,) = re.findall(r'value="t:([^"]*)"', answer.partition("</b>")[0])
+        shifts, nights = map(float, whole.split(","))
+        driven = next(money for name, money in rows.items() if name.startswith("as driven"))
+        assert nights > 0.0
+        assert driven == pytest.approx(shifts + nights)
+        assert rows["still to save"] == pytest.approx(driven - rows["with hibernation at night"])

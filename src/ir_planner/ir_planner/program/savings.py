@@ -47,12 +47,21 @@ class CommonProgram:
 
     @property
     def across(self) -> int:
-        """How many regional movements it has."""
-        return sum(part.kind == ACROSS for part in self.found)
+        """How many regional movements it has; to where the robot is already is none."""
+        return sum(part.kind == ACROSS and _goes(self.found[part]) for part in self.found)
 
     def steps(self, until: float = 0.0) -> Steps:
         """Movements and pauses in order, and a wait at the end that lasts until `until` s."""
         return self.choice.steps(self.found, until=until, by_itself=True)
+
+
+def _goes(movement: Movement) -> bool:
+    """Whether it leads anywhere, by more than a robot is off after a movement."""
+    q = movement.trajectory.positions
+    return float(np.abs(q[-1] - q[0]).max()) > _THERE
+
+
+_THERE = 1e-3  # rad
 
 
 def common_program(choice: Choice) -> CommonProgram:
