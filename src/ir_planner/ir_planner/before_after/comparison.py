@@ -110,7 +110,7 @@ def before_after_common(
         sides.append(asking.side(LINE, cycle_time, line, waiting))
     around = f"; {free.savings.around} of its movements had to be routed around machines"
     notes = (
-        "today's program is a reconstruction (point to point at 100 %), not a recorded one"
+        "the common program stands for today's (point to point at 100 %), which nobody recorded"
         f"{around if free.savings.around else ''}",
         *assumed_doors(planner.cell),
     )

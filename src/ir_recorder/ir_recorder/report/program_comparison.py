@@ -103,7 +103,7 @@ def year_of(found: BeforeAfter, side: Side, costs: Costs) -> Year:
 MODE = 1
 WORK = {MODE: "a power mode", 2: "other times on the same path", 3: "another path"}
 _MEANINGS = {
-    "same cycle time": "the planner's, in the time of today's",
+    "same cycle time": "the planner's, in the same time",
     "free": "the planner's, as fast as pays (--time-value)",
     "for the line": "the planner's, in the time that the line asks for",
 }

@@ -92,7 +92,7 @@ def _parts(tending: Tending) -> str:
         name = f"{part.number}"
         if part.number <= tending.filling:
             name += " <small>fills the line</small>"
-        late = {f"{name}, late": value for name, value in part.late.items()}
+        late = {f"{machine} late": value for machine, value in part.late.items()}
         rows.append(
             (
                 name,

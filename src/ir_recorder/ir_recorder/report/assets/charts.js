@@ -240,7 +240,7 @@ class TimeChart {
     g.strokeStyle = css("--soft");
     for (const x of [middle - 3, middle + 3]) line(g, x - 3, bottom + 5, x + 3, bottom - 5);
     g.fillStyle = css("--ink");
-    if (bottom - this.top < 120) return; /* no height for words: the chart above has them */
+    if (bottom - this.top < 130) return; /* no height for words: the chart above has them */
     const words = seconds < 600 ? `${Math.round(seconds)} s` : `${Math.round(seconds / 60)} min`;
     g.save();
     g.translate(middle, this.top + 6);
