@@ -58,6 +58,11 @@ BROKEN = {
         "gauge_seat, out",
         "washer has a process of 40 s, but the route doesn't visit it",
     ),
+    "room at the end": (
+        "- name: outfeed\n",
+        "- name: outfeed\n    capacity: 3\n    buffer: 1\n",
+        "outfeed has room for 4 parts, but the route doesn't visit it between its first",
+    ),
     "no process": ("process: {seconds: 12}", "enabled: true", "gauge, which has no process"),
     "begins elsewhere": (
         "visits: [infeed_pick, lathe_chuck, washer_basket, gauge_seat, outfeed_place]",

@@ -41,10 +41,11 @@ def check_route(
     left_out = own.keys() - {station.equipment for station in visited[1:-1]}
     instead = {station.equipment for station in stations if station.takes}
     for machine in machines:
-        if machine.process > 0.0 and machine.name in left_out - instead:
+        given = _given_of(machine)
+        if given and machine.name in left_out - instead:
             raise InvalidValueError(
-                f"{machine.name} has a process of {machine.process:g} s, but the route doesn't "
-                "visit it between its first and its last station"
+                f"{machine.name} has {given}, but the route doesn't visit it between its first and "
+                "its last station"
             )
     places = {part.name: part.station for part in parts}
     if route.part not in places:
@@ -54,6 +55,13 @@ def check_route(
             f"the route of {route.part} begins at {route.visits[0]}, but it lies at "
             f"{places[route.part] or 'no station'}"
         )
+
+
+def _given_of(machine: Equipment) -> str:
+    """What only a machine between the ends of a route has: a process or room; "" for neither."""
+    if machine.process > 0.0:
+        return f"a process of {machine.process:g} s"
+    return f"room for {machine.places} parts" if machine.places > 1 else ""
 
 
 def _check_visited(visited: Sequence[Station], machines: Mapping[str, Equipment]) -> None:
