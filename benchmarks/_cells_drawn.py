@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
 from ir_studies.cells.instance import (
@@ -20,6 +22,7 @@ from ir_studies.cells.instance import (
 _DIGITS = 6
 _SLACK = 0.15  # of the cycle, over the busiest robot's hidden schedule
 _PER_ROBOT = 1000  # numbers of activities and points per robot
+_APART = 3  # stops between one hand-over and the next
 
 
 class _Draw:
@@ -97,8 +100,10 @@ class _Draw:
         return at
 
 
-def drawn(robots: int, stops: int, seed: int, conflicts: int = 12) -> Instance:
-    """A cell with a chain of hand-overs between its robots, and choices that exclude each other."""
+def drawn(robots: int, stops: int, seed: int, conflicts: int = 12, handovers: int = 1) -> Instance:
+    """A cell with a chain of hand-overs between its robots, so many between neighbours, and choices
+    that exclude each other.
+    """
     rng = np.random.default_rng((seed, robots, stops))
     draws = [_Draw(k, rng, stops) for k in range(robots)]
     totals = [draw.hidden() for draw in draws]
@@ -111,10 +116,10 @@ def drawn(robots: int, stops: int, seed: int, conflicts: int = 12) -> Instance:
         stop = draw.stops[-1]
         draw.stops[-1] = StaticActivity(stop.number, stop.least, cycle, stop.places, closes=True)
     lags = []
-    handovers = []
-    for k in range(robots - 1):
-        giver = draws[k].stops[1]
-        taker = draws[k + 1].stops[1]
+    fits = []
+    for k, number in product(range(robots - 1), range(handovers)):
+        giver = draws[k].stops[1 + _APART * number]
+        taker = draws[k + 1].stops[1 + _APART * number + min(number, 1)]
         begin = phases[k] + draws[k].intervals[giver.number][0]
         taken = phases[k + 1] + draws[k + 1].intervals[taker.number][0]
         height = int(np.ceil((begin - taken) / cycle))
@@ -128,13 +133,13 @@ def drawn(robots: int, stops: int, seed: int, conflicts: int = 12) -> Instance:
         others = [
             (a.number, b.number) for a in giver.places for b in taker.places if rng.random() < 0.5
         ]
-        handovers.append(Handover((giver.number, taker.number), frozenset([hidden, *others])))
+        fits.append(Handover((giver.number, taker.number), frozenset([hidden, *others])))
     chosen = _exclusions(draws, phases, cycle, conflicts, rng) if robots > 1 else []
     made = tuple(
         InstanceRobot(f"robot {d.index}", tuple(d.stops), tuple(d.hops), d.modes) for d in draws
     )
     name = f"drawn_{robots}_{stops}_{seed}"
-    return Instance(name, cycle, made, tuple(lags), tuple(handovers), tuple(chosen))
+    return Instance(name, cycle, made, tuple(lags), tuple(fits), tuple(chosen))
 
 
 def _exclusions(

@@ -57,8 +57,9 @@ from ir_studies.stepped_run import driven_program
 
 PARTS = ("drawn", "large", "files", "steady", "flexible", "driven", "robots")
 SIZES = ((2, 6), (3, 6), (3, 9))  # robots and stops of each
-LARGE = ((5, 10, 120.0, 1.0), (8, 10, 600.0, 5.0), (12, 10, 600.0, 5.0))
+LARGE = ((5, 14, 120.0, 1.0), (8, 14, 600.0, 5.0), (12, 14, 600.0, 5.0))
 """Robots, stops of each, seconds of processor time, and the gap [%] within them."""
+DENSE = 3  # hand-overs between neighbours in large cells
 FIRST_SECONDS = 60.0  # of processor time, to a first schedule of a large cell
 ENERGY = 1e-5  # relative: what a schedule may be above a listed energy
 PARTS_PER_HOUR = 30.0
@@ -207,7 +208,8 @@ def main() -> None:
         rows += solved
     if arguments.only == "large" or (arguments.only is None and not arguments.quick):
         for robots, stops, most, gap in LARGE:
-            solved = list(instance_rows([drawn_file(robots, stops, 2, conflicts=40)], most, 0.0))
+            path = drawn_file(robots, stops, 2, conflicts=8 * robots, handovers=DENSE)
+            solved = list(instance_rows([path], most, 0.0))
             claims += large_claims(robots, solved, gap)
             rows += solved
     finish(arguments.json, [asdict(row) for row in rows], claims)
@@ -484,14 +486,14 @@ def large_claims(robots: int, rows: list[Row], gap: float) -> list[Claim]:
 def drawn_files(seeds: int) -> Iterator[Path]:
     """Small data sets."""
     for robots, stops in SIZES:
-        yield drawn_file(robots, stops, seeds, conflicts=12)
+        yield drawn_file(robots, stops, seeds, conflicts=12, handovers=1)
 
 
-def drawn_file(robots: int, stops: int, seeds: int, *, conflicts: int) -> Path:
+def drawn_file(robots: int, stops: int, seeds: int, *, conflicts: int, handovers: int) -> Path:
     """Drawn cells, in a file."""
     path = Path(f"out/drawn_{robots}_{stops}.xml")
     path.parent.mkdir(parents=True, exist_ok=True)
-    drawn_cells = [drawn(robots, stops, seed, conflicts) for seed in range(seeds)]
+    drawn_cells = [drawn(robots, stops, seed, conflicts, handovers) for seed in range(seeds)]
     path.write_text(written(drawn_cells), encoding="utf-8")
     return path
 
