@@ -247,7 +247,7 @@ def test_a_time_of_the_motion_has_its_step_power_and_nearest_pair(view: View) ->
 def test_it_is_compared_with_what_a_robot_does_today(view: View) -> None:
     view.planned()
     view.browser.press("compare")
-    view.shows("same cycle time", "against today", "0.2 EUR/kWh")
+    view.shows("planned program", "against the common program", "0.2 EUR/kWh")
 
 
 def test_viewers_come_and_go(view: View) -> None:

@@ -560,7 +560,7 @@ def _tiles(report: TrajectoryReport) -> list[Json]:
     """The figures of a plan, as every page has them."""
     within = span_of(report.energy_low, report.energy_high, kilowatt_hours)
     return [
-        ["cycle", seconds(report.duration), "planned"],
+        ["cycle", seconds(report.duration), "planned, as fast as pays"],
         ["energy a cycle", kilowatt_hours(report.energy), f"90 % interval {within}"],
         ["peak power", watts(report.peak_power), "at the mains, predicted"],
         ["least clearance", millimetres(report.min_clearance), "without pairs that may touch"],

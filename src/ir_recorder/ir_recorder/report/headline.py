@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime, timedelta
 
+from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.savings import ProgramSavings, one_sided
 from ir_recorder.analysis import Analysis, Finding, ProgramTotals, Share, Verdict, summary
 from ir_recorder.analysis.production import (
@@ -378,13 +379,23 @@ def _planned(analysis: Analysis) -> list[Tile]:
         known = cycle.low < cycle.high
         spread = f"90 % interval {span_of(*within, kilowatt_hours)}" if known else ""
         why = _says(one_sided(cycle.energy, *within))
-        said = f"in {seconds(cycle.seconds)}, predicted"
+        slower = cycle.savings is not None and cycle.seconds > planned_seconds(steps) + _SOONER
+        whose = f"the {COMMON}'s " if slower else ""
+        said = f"in {whose}{seconds(cycle.seconds)}, predicted"
         tiles.append(Tile("planned program", kilowatt_hours(cycle.energy), (said, spread, why)))
     near = millimetres(planned_clearance(steps))
     proved = analysis.recording.planned_certified
     proof = "proved: free of collision and within all limits" if proved else ""
     lines = ("planned, without pairs that may touch", proof)
     return [*tiles, Tile("least clearance", near, lines)]
+
+
+def planned_seconds(steps: Sequence[PlannedMovement]) -> float:
+    """How long the steps of a plan take [s], as fast as pays."""
+    return sum(step.duration for step in steps)
+
+
+_SOONER = 0.01  # s: as seconds are shown
 
 
 def _recorded(analysis: Analysis) -> Tile:
