@@ -1,9 +1,10 @@
 """Proofs that no path exists, in some tenths of a second, however long searches would look for one.
 
-A barrier: one joint would have to pass a value at which two links of the robot are too near,
-whatever the other joints do. An enclosure: a ball within the robot or its load would have to pass
-where it doesn't fit; walls that enclose an end, or that part the arm's reach, are recognised. A
-request that isn't recognised may still be impossible: only single balls and joints are followed.
+A barrier: one joint would have to pass a value at which two links of the robot, or the link that
+it alone moves and a body, are too near, whatever the other joints do. An enclosure: a ball within
+the robot or its load would have to pass where it doesn't fit; walls that enclose an end, or that
+part the arm's reach, are recognised. A request that isn't
+recognised may still be impossible: only single balls and joints are followed.
 """
 
 from __future__ import annotations
@@ -294,8 +295,8 @@ def _balls(space: FreeSpace) -> list[Ball]:
 
 # The distance of two capsules depends on the joints between them alone, and not on one that turns a
 # capsule about its own axis: forearm and flange of an arm with offsets at its wrist come near at
-# one value of axis 5, whatever the others do. Joints don't wrap round, so a path can't avoid a
-# value between its ends.
+# one value of axis 5, whatever the others do. That of link 1 from a body depends on the first joint
+# alone. Joints don't wrap round, so a path can't avoid a value between its ends.
 
 _VALUES = 181  # of a joint that are tried: 2 degrees apart over a whole turn
 
@@ -368,6 +369,8 @@ def spreads(scene: PlanningScene) -> FloatArray:
     spread = np.full((len(robot.joint_names), len(scene.collision.pairs)), np.inf)
     for number, pair in enumerate(scene.collision.pairs):
         if pair.body_b not in capsules:
+            if capsules[pair.body_a].link == 1:  # nothing but the first joint moves it
+                spread[0, number] = 0.0
             continue
         near, far = sorted((capsules[pair.body_a], capsules[pair.body_b]), key=lambda c: c.link)
         if near.link < robot.base:
