@@ -47,6 +47,7 @@ ROBOTS: Mapping[str, tuple[Callable[[], RobotModel], float]] = {
     "kr210_r2700_extra": (_kr210, 210.0),
 }
 SECONDS = 60.0
+WRONG_ZERO = 0.9  # rad
 AS_GOOD = 1.5  # times the error of the unspoilt fit on other movements, and
 BESIDE = 0.02  # of what they take beyond rest: what a fit that was read right may be off
 AS_IT_IS = "as it is"
@@ -90,12 +91,16 @@ def spoilt(good: Recording) -> Iterator[Spoilt]:
         sign = np.where(np.arange(n) == j, -1.0, 1.0)
         turned = _joints(good, good.joints * sign)
         yield Spoilt(f"sign of column {j + 1}", turned, f"the sign of {good.names[j]} changed")
+    for j in (1, 2, 4):
+        zero = np.where(np.arange(n) == j, WRONG_ZERO, 0.0)
+        yield Spoilt(f"zero of column {j + 1} elsewhere", _joints(good, good.joints + zero))
     for j in range(n):
         still = good.joints.copy()
         still[:, j] = still[0, j]
         yield Spoilt(f"column {j + 1} constant", _joints(good, still))
-    yield Spoilt("one phase of three", replace(good, watts=good.watts / 3.0))
-    yield Spoilt("two phases of three", replace(good, watts=good.watts * 2.0 / 3.0))
+    one, two = (replace(good, watts=good.watts * share / 3.0) for share in (1.0, 2.0))
+    yield Spoilt("one phase of three", one, "only a third")
+    yield Spoilt("two phases of three", two, "two thirds")
     yield Spoilt("kW under W", replace(good, watts=good.watts / 1e3))
     yield Spoilt("W under kW", replace(good, heading="power_kW"))
     yield Spoilt("degrees under rad", _joints(good, np.degrees(good.joints)))

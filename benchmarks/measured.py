@@ -38,6 +38,7 @@ from ir_recorder.fit import (
     plain_torques,
     recommendation,
     result,
+    shaft_power_rms,
     shaft_work,
 )
 from ir_recorder.fit.fit_data import without_turns
@@ -50,13 +51,23 @@ UR3E = "ur3e_rad.csv"
 KR300 = "kr300_r2500_ultra_{}.csv"
 RUNS = "ABC"
 TX40 = ("pos_read_data.csv", "curr_data.csv", "tx40_mdh_modified.urdf")
-UR10E = (
-    "ur-20_02_10-30sec_12harm.csv",
-    "ur-20_02_12-40sec_12harm.csv",
-    "ur-20_02_19_14harm50sec.csv",
-    "ur-20_02_19_15harm50sec.csv",
-    "ur-20_01_17-ptp_10_points.csv",
-)
+UR10E = {
+    "5 recordings": (
+        "ur-20_02_10-30sec_12harm.csv",
+        "ur-20_02_12-40sec_12harm.csv",
+        "ur-20_02_19_14harm50sec.csv",
+        "ur-20_02_19_15harm50sec.csv",
+        "ur-20_01_17-ptp_10_points.csv",
+    ),
+    "6 others": (
+        "ur-20_02_05-20sec_12harm.csv",
+        "ur-20_02_05-20sec_8harm.csv",
+        "ur-20_02_06-20sec_10harm.csv",
+        "ur-20_02_06-20sec_5harm.csv",
+        "ur-20_02_10-20sec_7harm.csv",
+        "ur-20_02_12-50sec_12harm.csv",
+    ),
+}
 TX40_STEP = 2e-4  # s
 TX40_THINNED = 10  # rows averaged to one: 2 ms
 PAYLOAD = 150.0  # kg: of the KR 300's recordings, not stated there
@@ -64,6 +75,7 @@ OPEN = 0.3  # deviation of a payload that nobody stated
 STRANGERS = 6
 NEAR = 0.2  # of the usual deviation from what is known: a good data sheet
 DRAWS = 200
+TWICE = ("TX40, without", "KR 300, payload fitted")  # data sets that stand there already
 LAST = 3  # parts of the TX40's recording; the last one is predicted
 START = "<!-- measured -->"
 END = "<!-- end -->"
@@ -107,6 +119,7 @@ def main() -> None:
             table += own
             claims += found
         rows = [row.words() for row in table]
+        claims += _nearer(table)
         held = sum(round(row.fit) for row in table if row.movements)
         count = sum(row.movements for row in table)
         if asked.page is not None:
@@ -161,10 +174,11 @@ def _sets(folder: Path) -> Iterator[tuple[list[Row], list[Claim]]]:
         yield _tx40(folder)
     else:
         print(f"left out: {', '.join(TX40)} are not in {folder}")
-    if all((folder / name).is_file() for name in UR10E):
-        yield _ur10e(folder)
-    else:
-        print(f"left out: {', '.join(UR10E)} are not in {folder}")
+    for what, names in UR10E.items():
+        if all((folder / name).is_file() for name in names):
+            yield _ur10e(folder, what, names)
+        else:
+            print(f"left out: {', '.join(names)} are not in {folder}")
 
 
 def _strangers(count: int) -> tuple[list[dict[str, Any]], list[Claim], list[bool]]:
@@ -373,19 +387,24 @@ def _kr300(folder: Path, what: str, deviation: float) -> tuple[list[Row], list[C
         for run in (each for each in RUNS if each not in known):
             both = [*known, run]
             whole = Estimate([runs[r] for r in both], both, model, prior, motors=True)
-            rows.append(_split(estimate, whole, f"KR 300, {what}", f"{known} to {run}"))
-    worst = max(abs(row.fit) for row in rows)
-    better = max(abs(row.fit) - abs(row.sheet) for row in rows)
+            rows += _split(estimate, whole, f"KR 300, {what}", f"{known} to {run}")
+    work = rows[::2]
+    worst = max(abs(row.fit) for row in work)
+    better = max(abs(row.fit) - abs(row.sheet) for row in work)
     return rows, [
         at_most(f"KR 300, {what}: work of the motors of an unknown run, worst", worst, "%", 3.0),
         at_most(f"KR 300, {what}: beside the data sheet, worst", better, "%", 0.0),
     ]
 
 
-def _split(known: Estimate, whole: Estimate, data: str, name: str) -> Row:
-    """The last recording of `whole` predicted by what `known` found, as work in % off."""
+def _split(known: Estimate, whole: Estimate, data: str, name: str) -> tuple[Row, Row]:
+    """The last recording of `whole` predicted by what `known` found, as work in % off and as power
+    at the shafts in W rms.
+    """
     motors = whole.motors
     assert motors is not None  # asked for
+    assert known.motors is not None
+    motors.turn(known.motors.travel)
     n = motors.n
     rows = len(motors.window) // n
     inside = motors.window[:rows] >= whole.runs[-1].first
@@ -399,12 +418,19 @@ def _split(known: Estimate, whole: Estimate, data: str, name: str) -> Row:
         own = shaft_work(predicted[inside], speed[inside])
         return 100.0 * (own / shaft_work(table[inside], speed[inside]) - 1.0)
 
+    def rms(predicted: FloatArray) -> float:
+        return shaft_power_rms((predicted - table)[inside], speed[inside])
+
     def at(x: FloatArray) -> FloatArray:
         return motors.predicted(x, 0.0)[0].reshape(n, rows).T
 
     plain = plain_torques(whole, inside)
     sheet = np.concatenate([whole.prior.mean[:count], extra])
-    return Row(data, f"work, {name}, %", off(at(known.found)), off(at(sheet)), off(plain))
+    given = (at(known.found), at(sheet), plain)
+    return (
+        Row(data, f"work, {name}, %", *(off(each) for each in given)),
+        Row(data, f"power, {name}, W rms", *(rms(each) for each in given)),
+    )
 
 
 def _tx40(folder: Path) -> tuple[list[Row], list[Claim]]:
@@ -422,17 +448,17 @@ def _tx40(folder: Path) -> tuple[list[Row], list[Claim]]:
         known = Estimate([first], ["first"], model, prior, motors=True)
         known.result("tx40")
         whole = Estimate([first, last], ["first", "last"], model, prior, motors=True)
-        rows.append(_split(known, whole, f"TX40, {what}", "two thirds to the last"))
+        rows += _split(known, whole, f"TX40, {what}", "two thirds to the last")
     name = "TX40: work of the motors in the last third"
     return rows, [at_most(name, abs(rows[0].fit), "%", 1.5)]
 
 
-def _ur10e(folder: Path) -> tuple[list[Row], list[Claim]]:
+def _ur10e(folder: Path, what: str, names: Sequence[str]) -> tuple[list[Row], list[Claim]]:
     """Work of a UR10e's motors by their currents: each recording by a fit on the others."""
     robot = load_robot("ur10e")
     model, prior = _model(robot)
     runs = []
-    for name in UR10E:
+    for name in names:
         table = np.loadtxt(folder / name, delimiter=",")
         columns = {}
         for k, joint in enumerate(robot.joint_names):
@@ -443,18 +469,19 @@ def _ur10e(folder: Path) -> tuple[list[Row], list[Claim]]:
         kept = {key: each[rising] for key, each in columns.items()}
         trace = Trace(name, table[rising, 0].copy(), kept)
         runs.append(_samples(trace, robot, prior, (), metered=False))
-    estimate = Estimate(runs, list(UR10E), model, prior, motors=True)
+    estimate = Estimate(runs, list(names), model, prior, motors=True)
     estimate.result("ur10e")
     found = left_out(estimate)
-    median, largest = (
-        Row("UR10e, 5 recordings", name, *(own(found, m) for m in METHODS))
+    median, largest, rms = (
+        Row(f"UR10e, {what}", name, *(own(found, m) for m in METHODS))
         for name, own in (
             ("work, median %", lambda rows, m: 100.0 * median_error(rows, m)),
             ("work, largest %", _largest),
+            ("power, W rms", _rms),
         )
     )
-    name = "UR10e: work of the motors of a recording left out, median"
-    return [median, largest], [
+    name = f"UR10e, {what}: work of the motors of a recording left out, median"
+    return [median, largest, rms], [
         at_most(f"{name}, beside the data sheet", median.fit / median.sheet, "", 1.0),
     ]
 
@@ -489,14 +516,31 @@ def _in_short(table: Sequence[Row]) -> Iterator[Row]:
     """For the page: splits of one data set as median and largest of their sizes."""
     for data, group in groupby(table, key=lambda row: row.data):
         rows = list(group)
-        splits = [row for row in rows if " to " in row.figure]
-        if len(splits) < 2:
-            yield from rows
-            continue
-        sizes = np.abs([[row.fit, row.sheet, row.regression] for row in splits])
-        for name, values in (("median", np.median(sizes, axis=0)), ("largest", sizes.max(axis=0))):
-            figure = f"work, {name} of {len(splits)} splits, %"
-            yield Row(data, figure, *(float(value) for value in values))
+        for kind, unit in (("energy", "%"), ("work", "%"), ("power", "W rms"), ("of ", "")):
+            splits = [row for row in rows if " to " in row.figure and row.figure.startswith(kind)]
+            if len(splits) < 2:
+                yield from (row for row in rows if row.figure.startswith(kind))
+                continue
+            sizes = np.abs([[row.fit, row.sheet, row.regression] for row in splits])
+            named = (("median", np.median(sizes, axis=0)), ("largest", sizes.max(axis=0)))
+            for name, values in named:
+                figure = f"{kind}, {name} of {len(splits)} splits, {unit}"
+                yield Row(data, figure, *(float(value) for value in values))
+
+
+def _nearer(table: Sequence[Row]) -> list[Claim]:
+    """Errors of the fit beside those of the regression, in the median of the data sets."""
+    short = [row for row in _in_short(table) if row.data not in TWICE]
+    claims = []
+    for name, kinds in (("energy or work", ("energy", "work")), ("power", ("power",))):
+        shares = {}
+        for row in short:
+            if row.figure.startswith(kinds) and "largest" not in row.figure:
+                shares[row.data] = abs(row.fit / row.regression)
+        if shares:
+            what = f"{len(shares)} data sets: error of {name} beside the regression's, median"
+            claims.append(at_most(what, float(np.median(list(shares.values()))), "", 0.8))
+    return claims
 
 
 def _write(page: Path, table: Sequence[Row]) -> None:

@@ -78,6 +78,42 @@ def test_friction_is_found_from_torques_without_a_meter(name: str) -> None:
     assert len(found.measured) == 0
 
 
+def given_way(speed: np.ndarray, step: float, travel: float) -> np.ndarray:
+    """Shares (M,) of dry friction by Dahl's equation in small steps: dz/dx = (1 - z sign v) / X."""
+    share = 0.0
+    shares = []
+    for v in speed.tolist():
+        for _ in range(200):
+            share += (1.0 - share * np.sign(v)) * v * step / 200.0 / travel
+        shares.append(share)
+    return np.array(shares)
+
+
+def test_a_travel_over_which_dry_friction_turns_is_found_where_there_is_one() -> None:
+    robot = load_robot("ur10e")
+    model, prior = model_of(robot)
+    truth = truth_of(prior, 3)
+    coulomb = truth[prior.places("coulomb")]
+    constants = np.array([1.0, 0.96, 1.05, 1.0, 0.95, 1.0])
+    travels = (2e-4, 5e-4, 0.0, 2e-3, 1e-3, 0.0)
+    runs = []
+    for seed in (1, 2):
+        run = told(moved(robot, seed), model, truth)
+        assert run.effort is not None
+        effort = run.effort.copy()
+        for j, travel in enumerate(travels):
+            if travel:
+                soft = given_way(run.qd[:, j], run.step, travel)
+                effort[:, j] += coulomb[j] * (soft - np.sign(run.qd[:, j]))
+        runs.append(replace(run, effort=effort * constants))
+    estimate = Estimate(runs, ["a", "b"], model, prior, motors=True)
+    found = estimate.result("x")
+    for travel, own in zip(travels, found.travel, strict=True):
+        assert travel / 4.0 <= own <= 4.0 * travel
+    rms = {row.method: row.rms for row in left_out(estimate) if row.part == "b"}
+    assert rms["fit"] < 0.7 * rms["regression"]
+
+
 def test_currents_give_the_gains_of_the_motors_too() -> None:
     robot = load_robot("ur10e")
     model, prior = model_of(robot)

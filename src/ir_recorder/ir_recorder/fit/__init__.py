@@ -9,6 +9,7 @@ from ir_recorder.fit.left_out import (
     median_error,
     plain_torques,
     recommendation,
+    shaft_power_rms,
     shaft_work,
 )
 from ir_recorder.fit.power_estimate import Estimate, Fit, FittedMovement, fit
@@ -35,6 +36,7 @@ __all__ = [
     "recommendation",
     "result",
     "sentences",
+    "shaft_power_rms",
     "shaft_work",
     "source_cell",
     "write_fit_picture",

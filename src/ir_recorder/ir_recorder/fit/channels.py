@@ -24,6 +24,11 @@ MOVED = 0.05  # rad: a joint that moves
 LEAST_WATTS = 0.5  # noise of a residual, at least: the resolution of meters
 _LEAST_SHARE = 1e-3  # of the largest effort of an axis: the resolution of controllers
 _OFFSET = 0.02  # of the largest effort: what a sensor or a centre of mass may add to an axis
+_TRAVELS = (3e-5, 1e-4, 3e-4, 1e-3)  # rad: of gears and bearings that give way before they slide
+_CONSTANT = 0.05  # of a torque: motor constants differ, and fall by 0.1 % per K
+_NEARER = 0.98  # of the error with friction that turns at once: with more, it does
+
+FRICTION = ("viscous", "coulomb")
 
 
 def by_window(values: FloatArray) -> FloatArray:
@@ -127,17 +132,28 @@ class MeterChannel:
         return np.concatenate(parts)
 
 
+_FACTORS = ("link_mass", "load_mass", "rotor_inertia", "counterbalance")
+
+
+def _bodies(prepared: Prepared) -> FloatArray:
+    """Nm (M, n, K) of what each of _FACTORS multiplies, then per metre of each centre of mass."""
+    arm = prepared.torques
+    bodies = np.stack([arm.links, arm.loads, arm.rotors, -arm.counterbalance], axis=2)
+    return np.concatenate([bodies, np.moveaxis(prepared.centres, 0, 2)], axis=2)
+
+
 class Motors:
     """Torques of the motors as seen at the joints, or their currents; a group per axis that moves,
     then one per axis that stands: there friction holds with whatever it is asked for, up to where
     it breaks away.
 
     The last 2 n values of x are an offset per axis in Nm (of a sensor, or of a centre of mass) and,
-    per axis, units of what the controller says per Nm: 1 for torques.
+    per axis, units of what the controller says per Nm: about 1 for torques. Dry friction turns over
+    `travel` (n,) rad, where that explains the torques better than at once.
     """
 
     def __init__(self, runs: Sequence[FittedRun], model: PowerModel) -> None:
-        self._runs = runs
+        self._runs = tuple(runs)
         self._model = model
         self.n = len(model.layout.joints)
         self._rows = []
@@ -158,6 +174,102 @@ class Motors:
         self.group = (np.arange(self.n)[:, None] + self.n * stands).ravel()
         self.largest = np.maximum(np.abs(self._table).max(axis=0, initial=0.0), 1e-9)
         self.least = np.tile(_LEAST_SHARE * self.largest, 2)
+        self._columns = self.reduced([_bodies(run.prepared) for run in runs])
+        self._turned = [self._sides(np.full(self.n, each)) for each in (0.0, *_TRAVELS)]
+        self.turn(np.zeros(self.n))
+        self.turn(self.found_travel())
+
+    def turn(self, travel: FloatArray) -> None:
+        """Let dry friction turn over a travel (n,) rad."""
+        self.travel = travel
+        sides = [run.prepared.turning_over(travel).side for run in self._runs]
+        self._side = self.reduced(sides)
+        self._sided = self.reduced(
+            [
+                _bodies(run.prepared) * side[:, :, None]
+                for run, side in zip(self._runs, sides, strict=True)
+            ]
+        )
+
+    def torque(self, mean: FloatArray) -> FloatArray:
+        """Nm (W, n) of the motors in every window."""
+        return self._torque(mean)[0]
+
+    def _torque(self, mean: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The same, what a column of `_bodies` adds to it (W, n, K), and what a share lost in the
+        gear does (W, n). Within a window the gear's torque keeps its sign.
+        """
+        of = self._model.layout.places
+        weights = self._weights(mean)
+        through = self._columns @ weights
+        lost = np.sign(through) * (self._sided @ weights)
+        gear = mean[of("gear")]
+        by_column = self._columns + (gear * np.sign(through))[:, :, None] * self._sided
+        friction = mean[of("viscous")] * self.speed + mean[of("coulomb")] * self._side
+        return through + friction + gear * lost, by_column, lost
+
+    def _weights(self, mean: FloatArray) -> FloatArray:
+        """By what the columns of `_bodies` are multiplied (K,)."""
+        layout = self._model.layout
+        factors = [mean[layout.index(name)] for name in _FACTORS]
+        return np.concatenate([factors, factors[0] * mean[layout.centre_places()]])
+
+    def _slopes(self, mean: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Torques (W, n), and their derivatives (W, n, P) by all parameters."""
+        layout = self._model.layout
+        of = layout.places
+        torque, columns, lost = self._torque(mean)
+        slopes = np.zeros((*torque.shape, len(mean)))
+        axis = np.arange(self.n)
+        for term, values in (("viscous", self.speed), ("coulomb", self._side), ("gear", lost)):
+            slopes[:, axis, of(term).start + axis] = values
+        for k, name in enumerate(_FACTORS):
+            slopes[:, :, layout.index(name)] = columns[:, :, k]
+        centres = layout.centre_places()
+        shifts = columns[:, :, len(_FACTORS) :]
+        slopes[:, :, layout.index(_FACTORS[0])] += shifts @ mean[centres]
+        slopes[:, :, centres] = mean[layout.index(_FACTORS[0])] * shifts
+        return torque, slopes
+
+    def found_travel(self, seen: BoolArray | None = None) -> FloatArray:
+        """The travel (n,) rad by which a regression of each axis on its bodies' torque by the data
+        sheet, speed, acceleration, friction of either kind and a constant is nearest, in the
+        windows (W,) that were seen (None: in all).
+        """
+        rows = np.ones(len(self._table), bool) if seen is None else seen
+        bodies = self.bodies(self._model.layout.mean)[rows]
+        turns = self.accelerations()[rows]
+        one = np.ones(len(bodies))
+        found = np.zeros(self.n)
+        for j in range(self.n):
+            errors = []
+            for sides in self._turned:
+                side = sides[rows, j]
+                body = bodies[:, j]
+                speed = self.speed[rows, j]
+                regressors = [body, speed, side, np.abs(body) * side, turns[:, j], one]
+                columns = np.column_stack(regressors)
+                size = np.maximum(np.sqrt((columns**2).mean(axis=0)), 1e-12)
+                own = self._table[rows, j]
+                solved = np.linalg.lstsq(columns / size, own, rcond=1e-6)[0]
+                errors.append(float(np.square(own - columns / size @ solved).mean()))
+            best = int(np.argmin(errors))
+            if best and errors[best] < _NEARER**2 * errors[0]:
+                found[j] = _TRAVELS[best - 1]
+        return found
+
+    def _sides(self, travel: FloatArray) -> FloatArray:
+        """Sides (W, n) of dry friction that turns over a travel (n,) rad."""
+        return self.reduced([run.prepared.turning_over(travel).side for run in self._runs])
+
+    def bodies(self, mean: FloatArray) -> FloatArray:
+        """Torques (W, n) by parameters `mean`, without friction."""
+        return self._columns @ self._weights(mean)
+
+    def accelerations(self) -> FloatArray:
+        """Accelerations (W, n) of the joints, rad/s^2; 0 where the motion is unknown."""
+        turns = [np.where(run.samples.known[:, None], run.samples.qdd, 0.0) for run in self._runs]
+        return self.reduced(turns)
 
     @property
     def currents(self) -> bool:
@@ -170,7 +282,7 @@ class Motors:
         """
         if not self.currents:
             return np.ones(self.n)
-        torque = self.reduced([self._model.torque(mean, run.prepared) for run in self._runs])
+        torque = self.torque(mean)
         table = self._table
         if seen is not None:
             torque = torque[seen]
@@ -182,7 +294,7 @@ class Motors:
         """Values and deviations (2 n,) of offsets and scales before the fit."""
         scales = self.scales(mean)
         size = np.where(scales == 0.0, 1.0, np.abs(scales))
-        spread = 0.5 * size if self.currents else np.zeros(self.n)
+        spread = (0.5 if self.currents else _CONSTANT) * size
         return (
             np.concatenate([np.zeros(self.n), scales]),
             np.concatenate([_OFFSET * self.largest / size, spread]),
@@ -192,10 +304,9 @@ class Motors:
         """Efforts (R,) and their slopes (R, P + E)."""
         count = len(x) - 2 * self.n
         mean, offset, scale = np.split(x, [count, count + self.n])
-        torque = self.reduced([self._model.torque(mean, run.prepared) for run in self._runs])
-        parts = [self._model.torque_slopes(mean, run.prepared) for run in self._runs]
+        torque, by_mean = self._slopes(mean)
         slopes = np.zeros((*torque.shape, len(x)))
-        slopes[:, :, :count] = self.reduced(parts) * scale[None, :, None]
+        slopes[:, :, :count] = by_mean * scale[None, :, None]
         axis = np.arange(self.n)
         slopes[:, axis, count + axis] = scale
         slopes[:, axis, count + self.n + axis] = torque + offset
@@ -206,9 +317,6 @@ class Motors:
         """Means over the rows of values (M, ...) of each recording."""
         parts = [by_window(each)[rows] for each, rows in zip(values, self._rows, strict=True)]
         return np.concatenate(parts)
-
-
-FRICTION = ("viscous", "coulomb")
 
 
 def open_prior(prior: PowerParameters, level: float) -> PowerParameters:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from heapq import nsmallest
 from itertools import combinations
 
 import numpy as np
@@ -77,8 +78,8 @@ def fit_sources(
 @dataclass(frozen=True)
 class Doubts:
     """sentences: on recordings whose power or torques the fit explains badly or by what can't be;
-    each ends with what to look at. undecided: on columns of joints that the power does not tell
-    apart.
+    each ends with what to look at. undecided: on columns of joints and shares of the watts that
+    the power does not tell apart.
     """
 
     sentences: tuple[str, ...]
@@ -93,10 +94,11 @@ def doubts(estimate: Estimate, found: Fit | None = None) -> Doubts:
         said += _of_factors(estimate, found)
     if found is not None and estimate.meter is not None:
         said += _of_gains(estimate, found)
+        open_ones = _undecided_gains(estimate)
         columns = _columns(estimate)
         if columns is not None:
             said += _of_columns(columns)
-            open_ones = _undecided(columns)
+            open_ones += _undecided(columns)
     if estimate.meter is not None:
         fitted = estimate.meter.watts(estimate.found[: len(estimate.prior.names)])
         sheet = estimate.meter.watts(estimate.prior.mean)
@@ -175,7 +177,8 @@ def _of_still_joints(estimate: Estimate) -> Iterator[str]:
 #
 # A model that takes g times the watts, with g times the masses and friction, predicts the same
 # movements: whether the meter shows a share of the watts is seen only by what is known of masses,
-# inertias and losses. So the fit is held against the same with every g.
+# inertias and losses. So the fit is held against the same with every g. Where a share that a clamp
+# left out would make explains the watts as well, that is said.
 
 _FAR = 4.0  # deviations, of what was known and of what the fit leaves, together
 _KNOWN_FACTORS = (
@@ -186,6 +189,8 @@ _KNOWN_FACTORS = (
     "rectifier_efficiency",
 )
 _GAINS = {1.0 / 3.0: "a third", 0.5: "half", 2.0 / 3.0: "two thirds", 2.0: "twice", 3.0: "3 times"}
+_PHASES = (1.0 / 3.0, 2.0 / 3.0)  # of _GAINS: clamps left out
+_UNLIKELY = 9.0  # squared deviations more: three deviations
 _LIKELIER = 3.0  # by how much the sum of squared deviations has to fall
 _WITH_WATTS = ("viscous", "coulomb", "iron", "link_mass", "load_mass", "rotor_inertia")
 _AGAINST_WATTS = ("copper",)
@@ -222,6 +227,46 @@ def _of_gains(estimate: Estimate, found: Fit) -> Iterator[str]:
         )
 
 
+def _undecided_gains(estimate: Estimate) -> tuple[str, ...]:
+    """A sentence on shares of the watts that the meter may show as well: all is fitted again as if
+    it did.
+    """
+    costs = {share: _cost_of(estimate, share) for share in (1.0, *_PHASES)}
+    alike = [
+        f"{_GAINS[share]} ({costs[share]:.0f})"
+        for share in _PHASES
+        if costs[share] < costs[1.0] + _UNLIKELY
+    ]
+    if not alike:
+        return ()
+    return (
+        f"if the meter showed only {' or '.join(alike)} of the watts, they would be explained as "
+        f"well (squared deviations; as read {costs[1.0]:.0f}): these watts do not prove that all "
+        "three phases are in. Count them, or record with a heavy part of known mass and without it",
+    )
+
+
+def _cost_of(estimate: Estimate, share: float) -> float:
+    """Squared deviations of meter and parameters if the meter shows a share of the watts."""
+    assert estimate.meter is not None  # asked before
+    recordings = [replace(each.samples, watts=each.samples.watts / share) for each in estimate.runs]
+    names = [each.name for each in estimate.runs]
+    own = Estimate(recordings, names, estimate.model, estimate.given)
+    count = len(own.prior.names)
+    start = estimate.found[:count].copy()
+    for k, name in enumerate(own.prior.names):
+        kind = name.partition(".")[0]
+        if kind in (*_WITH_WATTS, "watts"):
+            start[k] /= share
+        elif kind in _AGAINST_WATTS:
+            start[k] *= share
+    weight = share * estimate.weight[: len(estimate.meter.measured)]
+    return min(
+        own.least_cost(each, weight, estimate.wide[:count])
+        for each in (start, estimate.found[:count])
+    )
+
+
 def _strain(estimate: Estimate, found: Fit, factor: float) -> float:
     """Squared deviations from what is known of what the data determine, if the robot took `factor`
     times the watts that the meter shows.
@@ -247,11 +292,21 @@ def _strain(estimate: Estimate, found: Fit, factor: float) -> float:
 # and the columns as given, are then fitted to a part of the recording, by the noise of the meter
 # alone: columns of a wrist that are exchanged leave errors that a widened noise would swallow.
 # Readings that explain the power about as well as the columns as given are no doubt, but said: the
-# watts do not tell them apart.
+# watts do not tell them apart. So are zeros of a joint elsewhere tried, in steps of an eighth of a
+# turn: gravity tells these where the joint does not turn about a vertical axis, and where it does
+# they change nothing.
 
 _SECONDS = 40.0  # of a recording that other columns are tried on
 _STRIDE = 5.0  # s between parts that are looked at
-_LIKELIEST = 5  # readings that are fitted
+_LIKELIEST = 5  # readings that are fitted, of columns and signs
+_LIKELIEST_ZEROS = 2  # of zeros
+_ZEROS = {
+    0.25 * np.pi: "45",
+    -0.25 * np.pi: "-45",
+    0.5 * np.pi: "90",
+    -0.5 * np.pi: "-90",
+    np.pi: "180",
+}
 _ODDS = 12.0  # by how much twice the log-likelihood has to rise, with noise as wide as the fit's
 _BETTER = 0.5  # or: of the squares that are left as given, whatever they count
 _AS_WELL = 1.1  # of the squares that are left as given: with at most so many it is no worse
@@ -260,13 +315,15 @@ _AS_WELL = 1.1  # of the squares that are left as given: with at most so many it
 @dataclass(frozen=True)
 class _Columns:
     """Of a recording: the squares that are left by its columns as given, how many a reading must
-    leave to be better, and those that the likeliest readings leave, by what was changed in them.
+    leave to be better, and those that the likeliest readings leave, by what was changed in them:
+    columns or signs, and zeros.
     """
 
     name: str
     as_given: float
     better: float
     changed: tuple[tuple[str, float], ...]
+    zeros: tuple[tuple[str, float], ...]
 
 
 def _undecided(columns: _Columns) -> tuple[str, ...]:
@@ -289,7 +346,7 @@ def _of_columns(columns: _Columns) -> Iterator[str]:
     """Two columns of joints that explain the power better the other way round, or one that does
     with its sign changed.
     """
-    what, left = min(columns.changed, key=lambda each: each[1])
+    what, left = min((*columns.changed, *columns.zeros), key=lambda each: each[1])
     if left < columns.better:
         yield (
             f"{columns.name}: with {what} the power is explained better "
@@ -306,24 +363,50 @@ def _columns(estimate: Estimate) -> _Columns | None:
     usable = part.known & np.isfinite(part.watts)
     if np.count_nonzero(usable & part.moving) < _FEWEST or usable.mean() < _USABLE:
         return None
+    n = len(estimate.prior.joints)
+    as_given = _Reading(estimate, part, np.arange(n), np.ones(n), np.zeros(n)).fitted()
+    sure = as_given - _ODDS * estimate.widened_by()
+    return _Columns(
+        run.name,
+        as_given,
+        max(sure, _BETTER * as_given),
+        _fitted(_other_columns(estimate, part), _LIKELIEST),
+        _fitted(_other_zeros(estimate, part), _LIKELIEST_ZEROS),
+    )
+
+
+def _other_columns(estimate: Estimate, part: Samples) -> Iterator[tuple[str, _Reading]]:
+    """Readings with the sign of a joint changed, or with the columns of two swapped."""
     joints = estimate.prior.joints
-    n = len(joints)
-    given = np.arange(n)
-    up = np.ones(n)
-    readings: list[tuple[str, IntArray, FloatArray]] = [
-        (f"the sign of {joints[j]} changed", given, np.where(given == j, -1.0, 1.0))
-        for j in range(n)
-    ]
-    for a, b in combinations(range(n), 2):
+    given = np.arange(len(joints))
+    up = np.ones(len(joints))
+    here = np.zeros(len(joints))
+    for j, joint in enumerate(joints):
+        sign = np.where(given == j, -1.0, up)
+        yield f"the sign of {joint} changed", _Reading(estimate, part, given, sign, here)
+    for a, b in combinations(range(len(joints)), 2):
         order = given.copy()
         order[[a, b]] = b, a
-        readings.append((f"the columns of {joints[a]} and {joints[b]} swapped", order, up))
-    tried = [_Reading(estimate, part, order, sign) for _, order, sign in readings]
-    likeliest = np.argsort([each.cost() for each in tried], kind="stable")[:_LIKELIEST]
-    as_given = _Reading(estimate, part, given, up).fitted()
-    sure = as_given - _ODDS * estimate.widened_by()
-    changed = tuple((readings[k][0], tried[k].fitted()) for k in likeliest.tolist())
-    return _Columns(run.name, as_given, max(sure, _BETTER * as_given), changed)
+        what = f"the columns of {joints[a]} and {joints[b]} swapped"
+        yield what, _Reading(estimate, part, order, up, here)
+
+
+def _other_zeros(estimate: Estimate, part: Samples) -> Iterator[tuple[str, _Reading]]:
+    """Readings with the zero of a joint elsewhere."""
+    joints = estimate.prior.joints
+    given = np.arange(len(joints))
+    up = np.ones(len(joints))
+    for j, joint in enumerate(joints):
+        for angle, degrees in _ZEROS.items():
+            zero = np.where(given == j, angle, 0.0)
+            what = f"{degrees} degrees, or about so many, added to {joint}"
+            yield what, _Reading(estimate, part, given, up, zero)
+
+
+def _fitted(readings: Iterator[tuple[str, _Reading]], count: int) -> tuple[tuple[str, float], ...]:
+    """The likeliest readings, with the squares that they leave when they are fitted."""
+    likeliest = nsmallest(count, readings, key=lambda each: each[1].cost())
+    return tuple((what, each.fitted()) for what, each in likeliest)
 
 
 def _liveliest(samples: Samples) -> Samples:
@@ -340,14 +423,21 @@ def _liveliest(samples: Samples) -> Samples:
 
 
 class _Reading:
-    """The power of a part with its columns in another order and with other signs, both (n,)."""
+    """The power of a part with its columns in another order, with other signs and with zeros
+    elsewhere [rad], all (n,).
+    """
 
     def __init__(
-        self, estimate: Estimate, part: Samples, order: IntArray, sign: FloatArray
+        self,
+        estimate: Estimate,
+        part: Samples,
+        order: IntArray,
+        sign: FloatArray,
+        zero: FloatArray,
     ) -> None:
         motion = (each[:, order] * sign for each in (part.q, part.qd, part.qdd))
         q, qd, qdd = motion
-        turned = replace(part, q=q, qd=qd, qdd=qdd, effort=None)
+        turned = replace(part, q=q + zero, qd=qd, qdd=qdd, effort=None)
         self._own = Estimate([turned], [""], estimate.model, estimate.given)
         assert self._own.meter is not None  # asked before
         found = estimate.found[: len(self._own.prior.names)].copy()

@@ -212,8 +212,9 @@ class Fit:
     meter), torque_noise (n,) of each axis in motion, in what the controller says (none
     without).
     inflation: of the noise, so that the covariance explains the residuals of movements and rests.
-    friction_scale: times the deviation of friction before. offsets (n,) Nm and scales (n,) A/Nm of
-    the motors, where these were fitted.
+    friction_scale: times the deviation of friction before. offsets (n,) Nm, scales (n,) and travel
+    (n,) rad of the motors, where these were fitted; scales: what the controller says per Nm,
+    amperes (currents) or Nm by its own motor constants; travel: over which dry friction turns.
     """
 
     parameters: PowerParameters
@@ -229,6 +230,8 @@ class Fit:
     friction_scale: float
     offsets: tuple[float, ...]
     scales: tuple[float, ...]
+    travel: tuple[float, ...]
+    currents: bool
 
     @property
     def kept(self) -> tuple[str, ...]:
@@ -413,6 +416,8 @@ class Estimate:
             self._friction_scale,
             tuple(extra[:n].tolist()),
             tuple(extra[n:].tolist()),
+            () if self.motors is None else tuple(self.motors.travel.tolist()),
+            self.motors is not None and self.motors.currents,
         )
 
     def _first_noise(self) -> FloatArray:

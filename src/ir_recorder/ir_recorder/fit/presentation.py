@@ -39,10 +39,11 @@ def sentences(found: Fit, begun: str = "the data sheet") -> tuple[str, ...]:
         )
     if not metered:
         noise = ", ".join(f"{each:.3g}" for each in found.torque_noise)
-        unit = "A" if any(each != 1.0 for each in found.scales) else "Nm"
+        unit = "A" if found.currents else "Nm"
         return (
             *lines,
             f"motors over 50 ms are off by {noise} {unit} (rms, by axis)",
+            *_turning(found),
             "there are no watts in these data: losses of drives and controller stay as before",
         )
     if not found.movements:
@@ -67,6 +68,17 @@ def sentences(found: Fit, begun: str = "the data sheet") -> tuple[str, ...]:
             f"that were not driven will meet it too"
         )
     return tuple(lines)
+
+
+def _turning(found: Fit) -> tuple[str, ...]:
+    """How dry friction turns, where it does not at once."""
+    if not any(found.travel):
+        return ()
+    travel = ", ".join(f"{1e3 * each:g}" for each in found.travel)
+    return (
+        f"after a reversal dry friction turns over {travel} mrad (by axis; 0: at once): gears give "
+        "way before they slide",
+    )
 
 
 def _share(movements: Sequence[FittedMovement], field: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import exp, log1p
 
 import numpy as np
@@ -166,18 +166,47 @@ def _joules(link: DcLink, volts: float) -> float:
 STILL = 1e-3  # rad/s over which friction changes its sign
 
 
+def friction_side(speed: FloatArray, step: float, travel: FloatArray) -> FloatArray:
+    """The share (M, n), -1 to 1, of dry friction that acts at speeds (M, n) every `step` [s].
+
+    After a reversal teeth and bearings give way before they slide: the share comes near its other
+    end over `travel` (n,) rad (Dahl, "A solid friction model", 1968); with 0 it changes at once.
+    """
+    side = np.tanh(speed / STILL)
+    gives = travel > 0.0
+    if not gives.any():
+        return side
+    moved = speed[:, gives] * step
+    kept = np.exp(-np.abs(moved) / travel[gives])
+    pushed = (1.0 - kept) * np.sign(moved)
+    share = np.zeros(int(gives.sum()))
+    shares = np.empty_like(moved)
+    for k in range(len(moved)):
+        share = pushed[k] + kept[k] * share
+        shares[k] = share
+    side[:, gives] = shares
+    return side
+
+
 @dataclass(frozen=True, eq=False)
 class Prepared:
     """Samples with the torques of their bodies and the speeds (M, n) of their motors, both as seen
-    at the joints; tool_watts (M,) W of the tool by its declaration; centres (2 n, M, n) Nm per
-    metre that a link's centre of mass lies elsewhere, none where these are no parameters.
+    at the joints; side (M, n): of their dry friction; tool_watts (M,) W of the tool by its
+    declaration; centres (2 n, M, n) Nm per metre that a link's centre of mass lies elsewhere, none
+    where these are no parameters.
     """
 
     samples: Samples
     torques: ArmTorques
     speed: FloatArray
+    side: FloatArray
     tool_watts: FloatArray
     centres: FloatArray
+
+    def turning_over(self, travel: FloatArray) -> Prepared:
+        """The same with dry friction that turns over a travel (n,) rad."""
+        side = friction_side(self.speed, self.samples.step, travel)
+        return replace(self, side=side)
 
 
 class PowerModel:
@@ -237,8 +266,12 @@ class PowerModel:
             links, held, _, spring = (part @ np.linalg.inv(turns) for part in parts)
             rotors = (motion[2] @ turns.T) * self.robot.reflected_inertia
             arm = ArmTorques(links, held, rotors, spring)
-            return Prepared(samples, arm, motion[1] @ turns.T, watts, centres)
-        return Prepared(samples, ArmTorques(*parts), motion[1], watts, centres)
+            speed = motion[1] @ turns.T
+        else:
+            arm = ArmTorques(*parts)
+            speed = motion[1]
+        side = friction_side(speed, samples.step, np.zeros(self.robot.n))
+        return Prepared(samples, arm, speed, side, watts, centres)
 
     def watts(self, mean: FloatArray, prepared: Prepared) -> FloatArray:
         """Predicted W (M,) at the mains for parameters `mean` (P,)."""
@@ -332,7 +365,7 @@ class PowerModel:
         through = np.asarray(
             sum(self._one(mean, name) * body for name, body in self._bodies_of(mean, prepared))
         )
-        side = np.tanh(qd / STILL)
+        side = prepared.side
         return through, side, through + viscous * qd + (coulomb + gear * np.abs(through)) * side
 
     def _wanted(
