@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ir_description import PowerParameters, RobotModel, data_sheet_of, load_robot
+from ir_description import Load, PowerParameters, RobotModel, data_sheet_of, load_robot
 from ir_description.files import power_parameters_to_yaml
 from ir_description.library import power_parameters_of
 from ir_description.robot import centre_deviations
@@ -138,6 +138,59 @@ def test_columns_of_a_wrist_that_are_exchanged_are_doubted_or_said_to_be_undecid
     found = doubts(estimate, result(estimate, "x"))
     said = " ".join((*found.sentences, *found.undecided))
     assert f"the columns of {ROBOT.joint_names[3]} and {ROBOT.joint_names[4]} swapped" in said
+
+
+ZEROS = [
+    ("kr6_r900_2", 1, 2, 0.9),
+    *(
+        pytest.param(*case, marks=pytest.mark.long)
+        for case in (("kr6_r900_2", 2, 2, -0.9), ("kr6_r900_2", 3, 1, 0.9), ("ur10e", 1, 2, 1.5))
+    ),
+]
+
+
+@pytest.mark.parametrize(("name", "seed", "joint", "off"), ZEROS)
+def test_a_joint_whose_zero_is_elsewhere_is_named_by_the_watts(
+    name: str, seed: int, joint: int, off: float
+) -> None:
+    robot = load_robot(name)
+    model, prior = model_of(robot, centres=True)
+    samples = moved(robot, seed)
+    watts = model.watts(prior.drawn(seed).mean, model.prepare(samples)) + 90.0
+    noise = np.random.default_rng(seed).normal(0.0, 2.0, len(samples))
+    zero = np.where(np.arange(robot.n) == joint, off, 0.0)
+    shifted = replace(samples, watts=watts + noise, q=samples.q + zero)
+    estimate = Estimate([shifted], ["run"], model, prior)
+    said = " ".join(doubts(estimate, result(estimate, "x")).sentences)
+    assert f"{-45 * np.sign(off):.0f} degrees" in said or f"{-90 * np.sign(off):.0f} deg" in said
+    assert f"added to {robot.joint_names[joint]}" in said
+
+
+def test_a_meter_of_two_phases_of_three_is_told_or_may_be_one() -> None:
+    model, prior = model_of(ROBOT, centres=True)
+    samples = moved(ROBOT, 1)
+    watts = model.watts(prior.drawn(4).mean, model.prepare(samples)) + 90.0
+    estimate = Estimate([replace(samples, watts=2.0 / 3.0 * watts)], ["run"], model, prior)
+    found = result(estimate, "x")
+    said = doubts(estimate, found)
+    assert "two thirds" in " ".join((*said.sentences, *said.undecided))
+
+
+@pytest.mark.long
+def test_a_part_of_known_mass_and_none_prove_that_all_phases_are_in() -> None:
+    """Masses of the robot are known to 10 %, that of the part to 1 %."""
+    model, prior = model_of(ROBOT, centres=True)
+    load = Load("part", "part", 6.0, np.zeros(3), 0.01 * np.eye(3))
+    truth = prior.drawn(4).mean
+    runs = []
+    for seed, loads in ((1, ()), (2, (load,))):
+        samples = replace(moved(ROBOT, seed), loads=(loads,))
+        watts = model.watts(truth, model.prepare(samples)) + 90.0
+        noise = np.random.default_rng(seed).normal(0.0, 2.0, len(samples))
+        runs.append(replace(samples, watts=watts + noise))
+    estimate = Estimate(runs, ["without", "with"], model, prior)
+    said = doubts(estimate, result(estimate, "x"))
+    assert "phases" not in " ".join((*said.sentences, *said.undecided))
 
 
 def test_a_zero_that_is_off_is_no_mass_of_the_robot() -> None:

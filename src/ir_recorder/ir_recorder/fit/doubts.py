@@ -299,7 +299,7 @@ def _strain(estimate: Estimate, found: Fit, factor: float) -> float:
 _SECONDS = 40.0  # of a recording that other columns are tried on
 _STRIDE = 5.0  # s between parts that are looked at
 _LIKELIEST = 5  # readings that are fitted, of columns and signs
-_LIKELIEST_ZEROS = 2  # of zeros
+_LIKELIEST_ZEROS = 1  # of the zeros of each joint
 _ZEROS = {
     0.25 * np.pi: "45",
     -0.25 * np.pi: "-45",
@@ -371,7 +371,11 @@ def _columns(estimate: Estimate) -> _Columns | None:
         as_given,
         max(sure, _BETTER * as_given),
         _fitted(_other_columns(estimate, part), _LIKELIEST),
-        _fitted(_other_zeros(estimate, part), _LIKELIEST_ZEROS),
+        tuple(
+            each
+            for joint in range(n)
+            for each in _fitted(_other_zeros(estimate, part, joint), _LIKELIEST_ZEROS)
+        ),
     )
 
 
@@ -391,16 +395,15 @@ def _other_columns(estimate: Estimate, part: Samples) -> Iterator[tuple[str, _Re
         yield what, _Reading(estimate, part, order, up, here)
 
 
-def _other_zeros(estimate: Estimate, part: Samples) -> Iterator[tuple[str, _Reading]]:
+def _other_zeros(estimate: Estimate, part: Samples, joint: int) -> Iterator[tuple[str, _Reading]]:
     """Readings with the zero of a joint elsewhere."""
     joints = estimate.prior.joints
     given = np.arange(len(joints))
     up = np.ones(len(joints))
-    for j, joint in enumerate(joints):
-        for angle, degrees in _ZEROS.items():
-            zero = np.where(given == j, angle, 0.0)
-            what = f"{degrees} degrees, or about so many, added to {joint}"
-            yield what, _Reading(estimate, part, given, up, zero)
+    for angle, degrees in _ZEROS.items():
+        zero = np.where(given == joint, angle, 0.0)
+        what = f"{degrees} degrees, or about so many, added to {joints[joint]}"
+        yield what, _Reading(estimate, part, given, up, zero)
 
 
 def _fitted(readings: Iterator[tuple[str, _Reading]], count: int) -> tuple[tuple[str, float], ...]:

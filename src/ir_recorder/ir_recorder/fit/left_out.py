@@ -204,7 +204,7 @@ def _energies(
                     slope @ covariance @ slope
                     + WINDOW**2 * (estimate.inflation / estimate.weight[rows] ** 2).sum()
                 )
-                covered += abs(off) <= _NINETY * deviation
+                covered += int(abs(off) <= _NINETY * deviation)
     return errors, covered if covariance is not None else None
 
 
