@@ -207,10 +207,10 @@ def main() -> None:
         claims += [*small_claims("files", solved), *energy_claims(solved, listed)]
         rows += solved
     if arguments.only == "large" or (arguments.only is None and not arguments.quick):
-        for robots, stops, most, gap in LARGE:
-            path = drawn_file(robots, stops, 2, conflicts=8 * robots, handovers=DENSE)
+        for count, stops, most, gap in LARGE:
+            path = drawn_file(count, stops, 2, conflicts=8 * count, handovers=DENSE)
             solved = list(instance_rows([path], most, 0.0))
-            claims += large_claims(robots, solved, gap)
+            claims += large_claims(count, solved, gap)
             rows += solved
     finish(arguments.json, [asdict(row) for row in rows], claims)
 
