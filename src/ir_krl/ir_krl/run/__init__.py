@@ -20,10 +20,11 @@ from ir_krl.run.commands import (
 from ir_krl.run.memory import SignalRange
 from ir_krl.run.notes import Effect, Note, worst_first
 from ir_krl.run.program import Followed, UnknownRoutine, follow
-from ir_krl.run.values import FRAME_NAMES
+from ir_krl.run.values import FRAME_NAMES, RAIL_NAME
 
 __all__ = [
     "FRAME_NAMES",
+    "RAIL_NAME",
     "AdvanceStop",
     "Blend",
     "Command",

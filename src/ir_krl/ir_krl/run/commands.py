@@ -37,7 +37,8 @@ class Target:
     from where the robot stands; in_tool: in the directions of the tool instead of the base's. base,
     tool: poses (4, 4) [m] of $BASE in the robot's foot and of $TOOL at the flange. external: the
     tool stands in the cell, at $BASE, and $TOOL is the workpiece at the flange ($IPO_MODE #TCP):
-    the frame is that of the tool in the workpiece.
+    the frame is that of the tool in the workpiece. rail: E1 [m] of a robot on a rail, whose foot is
+    then where E1 is 0; None: it stays.
     """
 
     axes: dict[str, float] | None
@@ -50,6 +51,7 @@ class Target:
     tool: FloatArray
     name: str = ""
     external: bool = False
+    rail: float | None = None
 
     def flange(self, pose: FloatArray) -> FloatArray:
         """The flange (..., 4, 4) [m] in the robot's foot where the tool is at `pose` (..., 4, 4) in

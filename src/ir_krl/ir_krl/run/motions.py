@@ -52,6 +52,7 @@ from ir_krl.run.values import (
     AXIS_NAMES,
     EXTERNAL_NAMES,
     FRAME_NAMES,
+    RAIL_NAME,
     Structure,
     Symbol,
     Unknown,
@@ -64,6 +65,7 @@ from ir_krl.run.values import (
     kind_of,
     number,
     pose,
+    rail,
 )
 from ir_values.arrays import FloatArray
 
@@ -229,10 +231,13 @@ _BLEND_WORDS = {"C_PTP": "CPTP", "C_DIS": "CDIS", "C_ORI": "CORI", "C_VEL": "CVE
 
 class Motions:
     """Builds motions from trees; `expressions` evaluates what stands in them, `noted` hears
-    assumptions.
+    assumptions. on_rail: E1 carries the robot.
     """
 
-    def __init__(self, expressions: Expressions, memory: Memory, noted: Noted) -> None:
+    def __init__(
+        self, expressions: Expressions, memory: Memory, noted: Noted, *, on_rail: bool = False
+    ) -> None:
+        self._on_rail = on_rail
         self._expressions = expressions
         self._memory = memory
         self._noted = noted
@@ -305,7 +310,17 @@ class Motions:
         if is_axis_value(value):
             given = axes(value, place)
             return Target(
-                given, None, None, None, relative, in_tool, base, tool, name, self._external_tool
+                given,
+                None,
+                None,
+                None,
+                relative,
+                in_tool,
+                base,
+                tool,
+                name,
+                self._external_tool,
+                rail(value, place) if self._on_rail else None,
             )
         frame = components(value, FRAME_NAMES, place)
         if not frame:
@@ -324,7 +339,17 @@ class Motions:
             for part in ("S", "T")
         )
         return Target(
-            None, frame, status, turn, relative, in_tool, base, tool, name, self._external_tool
+            None,
+            frame,
+            status,
+            turn,
+            relative,
+            in_tool,
+            base,
+            tool,
+            name,
+            self._external_tool,
+            rail(value, place) if self._on_rail else None,
         )
 
     def _check_components(self, value: Structure, relative: bool, place: SourcePlace) -> None:
@@ -336,7 +361,9 @@ class Motions:
         if along is not None and is_axis_value(value):
             text = f"a position has axis angles or a frame, not both: leave out {along} or A1 to A6"
             raise KrlRunError(text, place)
-        for name, at in components(value, EXTERNAL_NAMES, place).items():
+        modelled = (RAIL_NAME,) if self._on_rail else ()
+        others = tuple(name for name in EXTERNAL_NAMES if name not in modelled)
+        for name, at in components(value, others, place).items():
             before = self._external.get(name, 0.0 if relative else at)
             now = before + at if relative else at
             self._external[name] = now

@@ -16,7 +16,7 @@ from ir_krl.run.memory import Memory, SignalRange, Signals, module_of
 from ir_krl.run.motions import Motions, Moving
 from ir_krl.run.notes import Effect, Note, worst_first
 from ir_krl.run.standing import AXES_NOW, PLACE_NOW, Kinematics, Standing
-from ir_krl.run.system import Assumption, assumed_variables, form_age, system_variables
+from ir_krl.run.system import AXES, Assumption, assumed_variables, form_age, system_variables
 from ir_krl.run.texts import TEXT_FUNCTIONS, text_value
 from ir_krl.run.values import TYPES, Array, Unknown, Value, copied, typed
 from ir_values.arrays import FloatArray
@@ -115,7 +115,8 @@ def follow(
 ) -> Followed:
     """Run `routine` (the first of the sources where "") without moving anything.
 
-    home (6,) [rad] is XHOME; tool (4, 4) [m] stands for tools whose data the program doesn't bring.
+    home (6,) [rad] is XHOME, of a robot on a rail E1 [m] first; tool (4, 4) [m] stands for tools
+    whose data the program doesn't bring.
     inputs: what $IN[n] reads, FALSE where nothing is said. A loop that nothing known ends is run
     `loop_passes` times. settings: data lists whose values count more than those of the sources
     (`settings_of`). kinematics: of the robot, without it a program that computes with the place
@@ -133,7 +134,8 @@ def follow(
     for source in sources:
         for body in (*source.data, *(one.body for one in source.routines)):
             memory.types |= _structures(body)
-    run = _Run(routines, memory, dict(inputs or {}), loop_passes)
+    on_rail = len(home) > AXES
+    run = _Run(routines, memory, dict(inputs or {}), loop_passes, on_rail=on_rail)
     run.standing = Standing(run.commands, home, kinematics)
     try:
         for source in sources:
@@ -198,7 +200,13 @@ class _Run(Moving):
     """Calls, declarations and motions, beside the control structures."""
 
     def __init__(
-        self, routines: Routines, memory: Memory, inputs: dict[int, bool], loop_passes: int
+        self,
+        routines: Routines,
+        memory: Memory,
+        inputs: dict[int, bool],
+        loop_passes: int,
+        *,
+        on_rail: bool = False,
     ) -> None:
         super().__init__(memory, loop_passes)
         memory.noted = self.note_at
@@ -209,7 +217,7 @@ class _Run(Moving):
         self.unknown: dict[str, UnknownRoutine] = {}
         self._calling = False  # a call as a statement begins
         self.expressions = Expressions(memory, self._signals, self._called)
-        self._motions = Motions(self.expressions, memory, self.note_at)
+        self._motions = Motions(self.expressions, memory, self.note_at, on_rail=on_rail)
         self._triggers = []
 
     @property

@@ -11,6 +11,7 @@ import numpy as np
 from ir_description.poses import pose_of, rotation_from_abc
 from ir_krl.errors import KrlRunError, SourcePlace
 from ir_krl.run.commands import Command, Motion, SplineBlock, Target
+from ir_krl.run.system import AXES, axis_fields
 from ir_krl.run.values import (
     AXIS_NAMES,
     FRAME_NAMES,
@@ -20,6 +21,7 @@ from ir_krl.run.values import (
     axes,
     frame,
     kind_of,
+    rail,
     real,
 )
 from ir_values.arrays import FloatArray
@@ -86,7 +88,7 @@ class Standing:
         """FORWARD: the E6POS of axis angles with the base and the tool of `frames`; None without a
         robot. Raises KrlRunError.
         """
-        q = _whole_axes(value, place)
+        q = _whole_axes(value, place, self.home)
         if self.kinematics is None:
             return None
         return self._position(frames, self.kinematics.flange(q[None])[0], q)
@@ -95,7 +97,7 @@ class Standing:
         """INVERSE: the axis angles at a target, from where they start; None without a robot. Raises
         KrlRunError, and KrlMotionError where no angles lead there.
         """
-        q = _whole_axes(start, place)
+        q = _whole_axes(start, place, self.home)
         if self.kinematics is None:
             return None
         return _angles(self.kinematics.reached(target, q, place))
@@ -130,27 +132,33 @@ class Standing:
                     return None
                 else:
                     given = motion.target.axes
-                    q = np.array([given.get(n, q[j]) for j, n in enumerate(AXIS_NAMES)])
+                    arm = [given.get(n, q[-AXES:][j]) for j, n in enumerate(AXIS_NAMES)]
+                    rails = q[:-AXES] if motion.target.rail is None else [motion.target.rail]
+                    q = np.array([*rails, *arm])
         self._replayed = len(self.commands)
         self._q = q
         return q
 
 
 def _angles(q: FloatArray) -> Structure:
-    """The E6AXIS of a configuration q (n,) [rad]."""
-    angles = (real(one) for one in np.degrees(q))
-    return Structure(dict(zip(AXIS_NAMES, angles, strict=True)), "E6AXIS")
+    """The E6AXIS of a configuration q (n,) [rad, of a rail m]."""
+    fields: dict[str, Value] = {name: real(value) for name, value in axis_fields(q).items()}
+    return Structure(fields, "E6AXIS")
 
 
-def _whole_axes(value: Value, place: SourcePlace) -> FloatArray:
-    """The configuration (n,) [rad] of axis angles. Raises KrlRunError where one lacks."""
+def _whole_axes(value: Value, place: SourcePlace, home: FloatArray) -> FloatArray:
+    """The configuration (n,) [rad] of axis angles, of a rail that they don't name as in `home`
+    (n,). Raises KrlRunError where an angle lacks.
+    """
     if isinstance(value, Unknown):
         raise KrlRunError(value.refusal("a computed position"), place)
     given = axes(value, place) if isinstance(value, Structure) else {}
     missing = ", ".join(name for name in AXIS_NAMES if name not in given)
     if missing:
         raise KrlRunError(f"{kind_of(value)} has no {missing}: give all axis angles", place)
-    return np.array([given[name] for name in AXIS_NAMES])
+    where = rail(value, place) if isinstance(value, Structure) else None
+    rails = home[:-AXES] if where is None or len(home) == AXES else [where]
+    return np.array([*rails, *(given[name] for name in AXIS_NAMES)])
 
 
 def _motions_of(command: Command) -> Sequence[Motion]:

@@ -9,7 +9,16 @@ from enum import Enum
 import numpy as np
 
 from ir_krl.run.notes import Effect
-from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES, Array, Structure, Symbol, Value, frame
+from ir_krl.run.values import (
+    AXIS_NAMES,
+    FRAME_NAMES,
+    RAIL_NAME,
+    Array,
+    Structure,
+    Symbol,
+    Value,
+    frame,
+)
 from ir_values.arrays import FloatArray
 
 AXES = 6
@@ -274,16 +283,23 @@ def form_age(versions: Collection[tuple[int, int]]) -> FormAge:
     return FormAge.NEW if newer.pop() else FormAge.OLD
 
 
+def axis_fields(q: FloatArray) -> dict[str, float]:
+    """A1 to A6 [deg] of a configuration (6,) [rad], of a robot on a rail with E1 [mm], which it has
+    first [m].
+    """
+    angles = zip(AXIS_NAMES, np.degrees(q[-AXES:]), strict=True)
+    rails = zip((RAIL_NAME,), q[:-AXES] * 1e3, strict=False)
+    return {name: float(value) for name, value in (*angles, *rails)}
+
+
 def system_variables(
     home: FloatArray, tool: FloatArray, forms: FormAge = FormAge.OPEN
 ) -> dict[str, Value]:
-    """Variables at the start: `home` (6,) [rad] is XHOME, `tool` (4, 4) [m] in the flange every
-    tool number whose data the program doesn't bring.
+    """Variables at the start: `home` (6,) [rad] is XHOME, of a robot on a rail E1 [m] first, `tool`
+    (4, 4) [m] in the flange every tool number whose data the program doesn't bring.
     """
     apo_mode: dict[str, Value] = {} if forms is FormAge.OLD else {"APO_MODE": Symbol("CDIS")}
-    angles: dict[str, Value] = {
-        name: float(angle) for name, angle in zip(AXIS_NAMES, np.degrees(home), strict=True)
-    }
+    angles: dict[str, Value] = dict(axis_fields(home))
     tool_frame = frame(tool)
     turning = {"ORI1": DEFAULTS["DEF_VEL_ORI1"], "ORI2": DEFAULTS["DEF_VEL_ORI2"]}
     turning_up = {"ORI1": DEFAULTS["DEF_ACC_ORI1"], "ORI2": DEFAULTS["DEF_ACC_ORI2"]}

@@ -260,6 +260,8 @@ ANGLE_NAMES = ("A", "B", "C")
 FRAME_NAMES = (*PLACE_NAMES, *ANGLE_NAMES)
 EXTERNAL_NAMES = ("E1", "E2", "E3", "E4", "E5", "E6")
 AXIS_NAMES = ("A1", "A2", "A3", "A4", "A5", "A6")
+RAIL_NAME = "E1"
+"""The external axis that carries a robot on a rail; it counts in mm."""
 _FRAME = dict.fromkeys(FRAME_NAMES, "REAL")
 _POS = {**_FRAME, "S": "INT", "T": "INT"}
 _AXIS = dict.fromkeys(AXIS_NAMES, "REAL")
@@ -312,6 +314,12 @@ def frame(transform: FloatArray, kind: str = "FRAME") -> Structure:
     return Structure(
         {name: real(value) for name, value in zip(FRAME_NAMES, values, strict=True)}, kind
     )
+
+
+def rail(value: Structure, place: SourcePlace) -> float | None:
+    """Where [m] a position has the rail; None: it doesn't say."""
+    found = components(value, (RAIL_NAME,), place)
+    return _MM * found[RAIL_NAME] if found else None
 
 
 def axes(value: Structure, place: SourcePlace) -> dict[str, float]:

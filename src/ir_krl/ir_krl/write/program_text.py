@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from ir_description.poses import inverse
 from ir_kernels import portable
 from ir_krl.errors import KrlError
 from ir_krl.run.commands import Payload
-from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES
+from ir_krl.run.system import axis_fields
+from ir_krl.run.values import FRAME_NAMES
 from ir_krl.write.forms import Forms, decimal, frame_text
 from ir_krl.write.identifiers import INPUT, OUTPUT, WIDTHS, Numbers, Wiring, check_name
 from ir_krl.write.numbering import BASES_MAX, TOOL_HIGHEST
@@ -326,8 +325,9 @@ def _truth(on: bool) -> str:
 
 
 def _axes(q: FloatArray) -> str:
-    angles = zip(AXIS_NAMES, np.degrees(q), strict=True)
-    return "{" + ",".join(f"{name} {decimal(angle, 7)}" for name, angle in angles) + "}"
+    """A configuration (6,) [rad], of a robot on a rail with E1 [m] first, as E6AXIS."""
+    fields = axis_fields(q).items()
+    return "{" + ",".join(f"{name} {decimal(value, 7)}" for name, value in fields) + "}"
 
 
 def _tool(tool: FloatArray) -> str:

@@ -264,12 +264,13 @@ def move(
 
 def _axis_limits(speeds: Speeds, limits: MotionLimits) -> MotionLimits:
     """What the program leaves of the axes' limits."""
-    share = np.asarray(speeds.axis_acceleration)
+    rails = np.ones(len(limits.velocity) - len(speeds.axis_velocity))  # no program bounds them
+    share = np.append(rails, speeds.axis_acceleration)
     kept = replace(
         limits,
-        velocity=limits.velocity * np.asarray(speeds.axis_velocity),
+        velocity=limits.velocity * np.append(rails, speeds.axis_velocity),
         acceleration=limits.acceleration * share,
-        jerk=limits.jerk * np.minimum(share, speeds.axis_jerk),
+        jerk=limits.jerk * np.minimum(share, np.append(rails, speeds.axis_jerk)),
     )
     return kept.for_speed(speeds.override)
 

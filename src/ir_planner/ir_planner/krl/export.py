@@ -43,7 +43,7 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import total_report
 from ir_planner.errors import RequestError
 from ir_planner.krl.execution import drive
-from ir_planner.krl.geometry import check_no_rail, tool_in_flange
+from ir_planner.krl.geometry import check_rail, tool_in_flange
 from ir_planner.krl.inline_moves import fitted_moves
 from ir_planner.krl.makes import Make, make_of, make_remark
 from ir_planner.krl.step_evaluation import ReadBack, StepEvaluator, called, points_of
@@ -110,9 +110,22 @@ def export(
     if not moving:
         raise RequestError(StatusCode.INVALID_MOTION_PLAN, "the program has no movement to export")
     check_name(name)
-    check_no_rail(scene)
+    check_rail(scene)
+    if scene.cell.robot.rail is not None:
+        _check_style_on_rail(moving, style)
     asked = numbers or FrameNumbers()
     return _Job(steps, name, scene, evaluator, times, check_style(style), around, asked).done()
+
+
+def _check_style_on_rail(moving: Sequence[PlannedMovement], style: str) -> None:
+    """Refuse what can't say where a rail is meanwhile."""
+    if style != "spline" or any(step.kind == MovementKind.CARTESIAN for step in moving):
+        what = "a path of the tool" if style == "spline" else f"style {style}"
+        raise RequestError(
+            StatusCode.INVALID_MOTION_PLAN,
+            f"{what} isn't written for a robot on a rail: movements in style spline are "
+            "(PTP_SPLINE, which moves E1)",
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ import numpy as np
 from ir_description.poses import abc_from_rotation, inverse, rotation_from_abc
 from ir_kernels import Chain, portable
 from ir_krl import KrlMotionError, SourcePlace
-from ir_krl.run import FRAME_NAMES, Effect, Note, Target
+from ir_krl.run import FRAME_NAMES, RAIL_NAME, Effect, Note, Target
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
 from ir_planner.scene import PlanningScene
@@ -28,22 +28,25 @@ def _signs(chain: Chain, q: FloatArray) -> FloatArray:
     """(N, 9): what the bits are signs of, a set bit is negative: three of the status, six of the
     turn.
     """
-    poses = chain.link_poses(q)
+    base = int(chain.first_slides)
+    poses = chain.link_poses(q)[:, base:]
+    arm = q[:, base:]
+    axes = chain.robot.joint_axis[base:]
     shoulder, elbow, wrist = (poses[:, k, :3, 3] for k in (2, 3, 5))
-    foot = chain.base_pose
-    seen = portable.matmul(wrist - foot[:3, 3], foot[:3, :3])  # in the robot's foot
-    turned = q[:, 0] * chain.robot.joint_axis[0, 2]
+    # in the robot's foot, on a rail where that is now
+    seen = portable.matmul((wrist - poses[:, 0, :3, 3])[:, None], chain.base_pose[:3, :3])[:, 0]
+    turned = arm[:, 0] * axes[0, 2]
     before = portable.cos(turned) * seen[:, 0] + portable.sin(turned) * seen[:, 1]
-    axis = portable.matmul(poses[:, 3, :3, :3], chain.robot.joint_axis[2])
+    axis = portable.matmul(poses[:, 3, :3, :3], axes[2])
     bent = np.einsum("ni,ni->n", np.cross(elbow - shoulder, wrist - elbow), axis)
-    return np.column_stack([before, -bent, q[:, 4], q])
+    return np.column_stack([before, -bent, arm[:, 4], arm])
 
 
 def status_turn(chain: Chain, q: FloatArray) -> tuple[int, int]:
     """S and T of a configuration q (n,) [rad]."""
     negative = _signs(chain, q[None])[0] < 0.0
     status = negative[:3] * (1 << np.arange(3))
-    turn = negative[3:] * (1 << np.arange(q.size))
+    turn = negative[3:] * (1 << np.arange(len(negative) - 3))
     return int(status.sum()), int(turn.sum())
 
 
@@ -59,8 +62,9 @@ def meeting(
     angle [rad] of an axis either bit of the turn is taken.
     """
     signs = _signs(chain, q)
-    undecided = np.array([_UNDECIDED] * 3 + [near] * q.shape[1])
-    wanted = np.concatenate([_bits(status, 3), _bits(turn, q.shape[1])])
+    axes = signs.shape[1] - 3
+    undecided = np.array([_UNDECIDED] * 3 + [near] * axes)
+    wanted = np.concatenate([_bits(status, 3), _bits(turn, axes)])
     agrees = (signs < 0.0) == (wanted == 1)
     return np.asarray((agrees | (np.abs(signs) < undecided) | (wanted < 0)).all(axis=1))
 
@@ -88,28 +92,27 @@ def tool_in_flange(tcp: FloatArray) -> FloatArray:
     return np.asarray(portable.matmul(inverse(FLANGE), tcp))
 
 
-def check_no_rail(scene: PlanningScene) -> None:
-    """Raise RequestError for a robot on a rail."""
+def check_rail(scene: PlanningScene) -> None:
+    """Raise RequestError for a robot on a rail that KRL would not call E1."""
     rail = scene.cell.robot.rail
-    if rail is not None:
+    if rail is not None and rail.name != RAIL_NAME:
         raise RequestError(
             StatusCode.INVALID_GOAL_CONSTRAINTS,
-            f"the robot is on the rail {rail.name}: programs of controllers are read and written "
-            "for arms without a rail only",
+            f"the robot is on the rail {rail.name}: programs of controllers move {RAIL_NAME} alone",
         )
 
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """The robot in its cell, as motions need it; noted: hears what is assumed of a target. Raises
-    RequestError for one on a rail.
+    """The robot in its cell, as motions need it; noted: hears what is assumed of a target. Its foot
+    is on a rail where E1 is 0. Raises RequestError for a rail that isn't E1.
     """
 
     scene: PlanningScene
     noted: Callable[[Note], None] = lambda note: None
 
     def __post_init__(self) -> None:
-        check_no_rail(self.scene)
+        check_rail(self.scene)
 
     def flange(self, q: FloatArray) -> FloatArray:
         """KUKA's flange (N, 4, 4) in the robot's foot, of q (N, n)."""
@@ -162,10 +165,21 @@ class Arm:
 
     def configurations(self, poses: FloatArray, target: Target) -> list[FloatArray]:
         """All configurations (m, n) within the limits for each tool pose (N, 4, 4) in the target's
-        base.
+        base. Raises RequestError for a robot on a rail: where that is along a path, no program
+        says.
         """
+        if self.scene.chain.first_slides:
+            raise RequestError(
+                StatusCode.INVALID_GOAL_CONSTRAINTS,
+                "motions of the tool (LIN, CIRC, SPL and their splines) are followed without a "
+                "rail only: PTP and PTP_SPLINE move E1",
+            )
+        return self._solutions(poses, target, np.zeros(1))
+
+    def _solutions(self, poses: FloatArray, target: Target, places: FloatArray) -> list[FloatArray]:
+        """The same with the rail at these places (P,) [m]."""
         tcp = self.tcp(target.flange(poses))
-        found = self.scene.inverse_kinematics.solve(tcp)
+        found = self.scene.inverse_kinematics_at(places).solve(tcp)
         return [found.of_pose(k) for k in range(len(poses))]
 
     def reached(self, target: Target, q: FloatArray, place: SourcePlace) -> FloatArray:
@@ -174,13 +188,17 @@ class Arm:
         """
         if target.axes is not None:
             end = np.array(q)
+            base = self.scene.cell.robot.base
             for name, angle in target.axes.items():
-                j = int(name[1:]) - 1
+                j = int(name[1:]) - 1 + base
                 end[j] = q[j] + angle if target.relative else angle
+            end[:base] = self._rail_after(target, q)[:base]
             self._check_limits(end, target, place)
             return end
         pose = self.pose(target, self.tool_pose(target, q))
-        found = self.configurations(pose[None], target)[0]
+        rail = self._rail_after(target, q)
+        self._check_limits(np.append(rail, q[len(rail) :]), target, place)
+        found = self._solutions(pose[None], target, rail)[0]
         if len(found) == 0:
             raise KrlMotionError(
                 f"{_called(target)}{_spelled(pose)} is out of reach: do $BASE and $TOOL fit the "
@@ -210,6 +228,13 @@ class Arm:
             )
         return np.asarray(fits[np.argmin(np.abs(fits - q).max(axis=1))])
 
+    def _rail_after(self, target: Target, q: FloatArray) -> FloatArray:
+        """Where (1,) [m] the rail is at a target, from q (n,) on; (0,) without a rail."""
+        now = q[: self.scene.cell.robot.base]
+        if target.rail is None:
+            return now
+        return now + target.rail if target.relative else np.full_like(now, target.rail)
+
     def _check_limits(self, q: FloatArray, target: Target, place: SourcePlace) -> None:
         robot = self.scene.cell.robot
         beyond = np.flatnonzero(
@@ -217,10 +242,10 @@ class Arm:
         )
         if len(beyond):
             j = int(beyond[0])
-            low, high = np.degrees([robot.position_min[j], robot.position_max[j]])
+            low, high = robot.position_min[j], robot.position_max[j]
             raise KrlMotionError(
-                f"{_called(target)}A{j + 1} {np.degrees(q[j]):.6g} deg is not within {low:g} to "
-                f"{high:g} deg",
+                f"{_called(target)}{robot.axis_label(j)} {robot.shown(j, q[j])} is not within "
+                f"{robot.shown(j, low).split()[0]} to {robot.shown(j, high)}",
                 place,
             )
 

@@ -12,7 +12,6 @@ from ir_krl.write import PLC_THERE, Attached, Numbers, Style, Texts, WrittenStat
 from ir_planner.scene import PlanningScene
 from ir_values.arrays import FloatArray
 
-_AXES = 6
 Header = Callable[[Texts], Sequence[str]] | Sequence[str]
 
 
@@ -69,7 +68,7 @@ class Kuka:
         """The program without its PLC."""
         sources = [parse(texts.source, "export.src"), parse(texts.data, "export.dat")]
         inputs = {texts.numbers[PLC_THERE]: False} if texts.numbers else {}
-        return follow(sources, np.zeros(_AXES), np.eye(4), inputs=inputs)
+        return follow(sources, np.zeros(scene.cell.robot.n), np.eye(4), inputs=inputs)
 
 
 class Ur:
