@@ -8,7 +8,7 @@ portfolio.
 
 | objective | companions of a free duration |
 | --- | --- |
-| time | fewest turns near its own paths (W); in a hurry (a high price of time) |
+| time | fewest turns near its own paths (W); in a hurry (a high price of time); other prices |
 | movement_cost | the answer for J |
 | energy | none; faster and slower movements near its own answer |
 | time_and_energy | none |
@@ -47,6 +47,7 @@ _OTHER_DURATIONS = (0.75, 1.33)
 _DURATION_STEPS = 4
 _COARSELY = 0.99  # of a bound by a few durations: the best of all is little below it
 _HURRY = 100.0  # times the robot's own value of a second
+_HURRIES = (1000.0, 300.0, 10.0)  # of further descents near the own paths
 _NEAR = 1.03  # times the duration of the fastest: a descent gains less
 _AT_A_BOUND = 0.999  # of a bound of the tool's speed or acceleration: the movement was slowed to it
 _WORTH_PROVING = 1.01  # times the cost of the best: coarse costs are off by less
@@ -89,13 +90,27 @@ def _in_a_hurry(own: Portfolio, exploration: Exploration, context: Context) -> A
     return _cheaper(hurried, None if fastest is None else (method, fastest))
 
 
+def _in_other_hurries(own: Portfolio, exploration: Exploration, context: Context) -> Answer | None:
+    """The fastest of the movements of other prices of time near the paths of the request's own
+    run.
+    """
+    context = context.asking("time")
+    best: Answer | None = None
+    for times in _HURRIES:
+        if context.work.exhausted:
+            break
+        hurried = _optimised_again(own, context.valuing_time(times))
+        best = _cheaper(best, _as_asked(hurried, context)[0])
+    return best
+
+
 def _for_both(own: Portfolio, exploration: Exploration, context: Context) -> Answer | None:
     """The answer for J."""
     return _explored(exploration, context.asking("time_and_energy")).best()
 
 
 COMPANIONS: Mapping[str, tuple[Companion, ...]] = {
-    "time": (_fewest_turns, _in_a_hurry),
+    "time": (_fewest_turns, _in_a_hurry, _in_other_hurries),
     "movement_cost": (_for_both,),
     "energy": (),
     "time_and_energy": (),
