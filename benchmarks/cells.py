@@ -505,7 +505,7 @@ def row_of(element: ET.Element, answer: CellAnswer, seconds: float) -> Row:
         for robot in (answer.schedule.robots if answer.schedule else ())
         for d in robot
     ]
-    found = faults(element, schedule)
+    found = faults(element, schedule) if schedule else []
     if schedule and abs(energy(element, schedule) - answer.energy) > 1e-6 * answer.energy:
         found.append("its energy is another")
     published = np.nan
