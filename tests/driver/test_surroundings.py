@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ir_description import Body, cell_hash, load_cell
-from ir_sim_driver.controller import Driver, PlannedCell, surroundings
+from ir_sim_driver.controller import Driver, PlannedCell, contacts, surroundings
 from ir_sim_driver.controller.driver import take_offered_cell
 from ir_sim_driver.errors import RequestRefusedError, TrajectoryRefusedError
 from ir_sim_driver.motion.goal import ErrorCode, GoalOutcome, TrajectoryGoal
@@ -249,6 +249,24 @@ def test_whatever_fails_while_a_cell_is_taken_leaves_the_old_one(make, monkeypat
     assert driver.failure == ""
     assert simulation.cell is before
     assert simulation.surroundings.hash == hashed
+
+
+def test_another_cell_is_arranged_once(make, monkeypatch):
+    """A cell of thousands of bodies takes long, and the plant waits meanwhile."""
+    simulation = make()
+    driver = Driver(simulation)
+    driver.offer_cell(planned(DEMO))
+    arranged = []
+    scene_of = contacts.ContactScene.of
+    monkeypatch.setattr(
+        contacts.ContactScene,
+        "of",
+        lambda cell, *given: arranged.append(cell.name) or scene_of(cell, *given),
+    )
+    driver.tick(2_000_000)
+    driver.tick(4_000_000)
+    driver.close()
+    assert arranged == [DEMO.name]
 
 
 def test_whatever_fails_while_a_load_is_taken_leaves_the_old_one(make, monkeypatch):

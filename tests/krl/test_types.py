@@ -176,6 +176,13 @@ def test_what_a_variable_cannot_hold_is_refused_at_its_place(line: str) -> None:
     assert caught.value.place.line == (12 if "FILL" in line else 6)
 
 
+def test_a_text_that_doubles_itself_is_refused_before_it_fills_the_memory() -> None:
+    lines = 'DEF P( )\nDECL INT n,k\nDECL CHAR s[9]\ns[]="ab"\nFOR k=1 TO 90\nn=StrAdd(s[],s[])\n'
+    with pytest.raises(KrlRunError, match="16384 letters: at most 10000") as caught:
+        follow([parse(lines + "ENDFOR\nEND\n", "p.src")], *ROBOT)
+    assert caught.value.place.line == 6
+
+
 COUNTED = {  # lines of a loop over I: what it waits for, and what I holds behind it
     "FOR i=1 TO 3\nWAIT SEC i\nENDFOR": ([1, 2, 3], 4),
     "FOR i=3 TO 1 STEP -1\nWAIT SEC i\nENDFOR": ([3, 2, 1], 0),

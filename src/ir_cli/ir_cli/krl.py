@@ -60,6 +60,8 @@ from ir_planner.krl import (
     follow_ur,
 )
 from ir_planner.program import AS_THE_CELL_SAYS
+from ir_values.errors import FileRefusedError
+from ir_values.files import ANYWHERE
 from ir_values.output_files import write_file
 
 UR = ".script"
@@ -460,8 +462,10 @@ def _comparison(compared: Row) -> list[str]:
 
 def _text(path: Path) -> str:
     try:
-        with path.open("rb") as file:
+        with ANYWHERE.open_to_read(path) as file:
             content = file.read(BYTES_MAX + 1)
+    except FileRefusedError as error:
+        raise InputError(str(error)) from error
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from error
     return text_of(content, str(path))

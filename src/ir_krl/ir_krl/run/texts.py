@@ -21,6 +21,7 @@ _ARGUMENTS = {
     "STRCLEAR": 1,
 }
 TEXT_FUNCTIONS = frozenset(_ARGUMENTS)
+_LETTERS_MAX = 10_000
 
 
 def text_value(
@@ -76,4 +77,8 @@ def _text(tree: SyntaxTree, expressions: Expressions, place: SourcePlace) -> str
 def _put(tree: SyntaxTree, text: str, expressions: Expressions, place: SourcePlace) -> None:
     if tree.data != "access":
         raise KrlRunError("the first argument is a variable: that gets the text", place)
+    if len(text) > _LETTERS_MAX:
+        raise KrlRunError(
+            f"the text has {len(text)} letters: at most {_LETTERS_MAX} are followed", place
+        )
     expressions.memory.set(expressions.path(tree), text, place)

@@ -104,12 +104,11 @@ def _stand_in(simulation: Simulation, cell: Cell) -> None:
     if warning:
         notices.add(Level.WARN, warning)
     try:
-        simulation.set_load(load)
+        simulation.set_load(load, cell)
     except (BackendError, RequestRefusedError) as error:
         notices.add(
             Level.ERROR, f"load {load.text!r} of cell {cell.name!r} can't be carried: {error}"
         )
-    simulation.cell_watch.stand_in(cell, simulation.load)
 
 
 def _back_to(simulation: Simulation, cell: Cell, load: Carried) -> None:

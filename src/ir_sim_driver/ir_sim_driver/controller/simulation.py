@@ -6,6 +6,7 @@ One `step` is dt of plant time. The caller decides how fast time passes. No ROS.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -301,8 +302,10 @@ class Simulation:
         """Watts at the mains when standing in a mode at the present posture."""
         return self.mains.standing_power(level, self.dynamics)
 
-    def set_load(self, load: Carried) -> None:
-        """Carry this from now on. Raises RequestRefusedError while the robot moves."""
+    def set_load(self, load: Carried, cell: Cell | None = None) -> None:
+        """Carry this from now on, and stand in another cell where one is given. Raises
+        RequestRefusedError while the robot moves.
+        """
         if not self.stands:
             raise RequestRefusedError(
                 StatusCode.INVALID_ROBOT_STATE,
@@ -310,12 +313,14 @@ class Simulation:
             )
         self.mains.settle()
         before = self.load
+        watch = self.cell_watch
+        arrange = watch.carry if cell is None else partial(watch.stand_in, cell)
         try:
             self._carry(load)
-            self.cell_watch.carry(load)
+            arrange(load)
         except Exception as error:  # whatever it is: the old load stays
             self._carry(before)
-            self.cell_watch.carry(before)
+            arrange(before)
             if isinstance(error, DriverError):
                 raise
             raise RequestRefusedError(
