@@ -127,6 +127,8 @@ REFUSED = {
     "a motion to a number": ("PTP 5", "1:5", "a motion can't go to the number 5"),
     "LIN to axis angles": ("LIN {A1 0}", "1:1", "LIN goes to a frame"),
     "a speed of nothing": ("$VEL.CP=0\nLIN {X 1}", "2:1", "$VEL.CP is 0; it must be above 0"),
+    "a speed of next to nothing": ("$VEL.CP=1E-30\nLIN {X 1}", "2:1", "at least 1e-06"),
+    "a share of next to nothing": ("$VEL_AXIS[1]=1E-30\nPTP {A1 1}", "2:1", "at least 1e-06 %"),
     "a share above all": ("$VEL_AXIS[2]=120\nPTP {A1 0}", "2:1", "$VEL_AXIS is 120 %"),
     "an interpolation of nothing": ("$IPO_MODE=#NOBODY", "1:1", "it is #BASE or #TCP"),
     "EXIT outside of a loop": ("EXIT", None, "EXIT stands outside of a loop"),

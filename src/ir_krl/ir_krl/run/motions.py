@@ -224,6 +224,7 @@ def _effect_of(name: str) -> Effect:
 
 _COMPONENTS = frozenset((*FRAME_NAMES, *AXIS_NAMES, *EXTERNAL_NAMES, "S", "T"))
 _STANDS = 1e-3  # mm or deg: an external axis that moves by less stands
+_SLOWEST = 1e-6  # m/s, deg/s, m/s^2, deg/s^2 or %: a movement of years
 _KINDS: dict[str, Kind] = {kind: kind for kind in get_args(Kind)}
 _MM = 1e-3  # m
 _BLEND_WORDS = {"C_PTP": "CPTP", "C_DIS": "CDIS", "C_ORI": "CORI", "C_VEL": "CVEL", "C_SPL": "CDIS"}
@@ -511,6 +512,10 @@ class Motions:
         value = number(fields.get(component, Unknown(written)), written, place)
         if value <= 0.0:
             raise KrlRunError(f"{variable}.{component} is {value:g}; it must be above 0", place)
+        if value < _SLOWEST:
+            raise KrlRunError(
+                f"{variable}.{component} is {value:g}; it must be at least {_SLOWEST:g}", place
+            )
         most = self._memory.peek(f"{variable}_MA")
         bound = most.fields.get(component) if isinstance(most, Structure) else None
         if isinstance(bound, int | float) and value > bound:
@@ -527,6 +532,8 @@ class Motions:
         value = number(self._memory.get(((name, index),), place), name, place)
         if not 0.0 < value <= FULL:
             raise KrlRunError(f"{name} is {value:g} %; it must be above 0 and at most 100 %", place)
+        if value < _SLOWEST:
+            raise KrlRunError(f"{name} is {value:g} %; it must be at least {_SLOWEST:g} %", place)
         return value / FULL
 
 

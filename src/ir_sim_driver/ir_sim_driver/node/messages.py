@@ -85,7 +85,8 @@ def _states(goal: Any) -> tuple[tuple[str, ...], int | None]:
             after_stop = int(value)
         else:
             raise TrajectoryRefusedError(
-                ErrorCode.INVALID_GOAL, f"{STOPS_STATE} is {value[:20]!a}: it must be a number"
+                ErrorCode.INVALID_GOAL,
+                f"{STOPS_STATE} is {value[:24]!a}: it must be below 1e{_DIGITS - 1}",
             )
     return tuple(machines), after_stop
 
