@@ -94,7 +94,8 @@ def doubts(estimate: Estimate, found: Fit | None = None) -> Doubts:
         said += _of_factors(estimate, found)
     if found is not None and estimate.meter is not None:
         said += _of_gains(estimate, found)
-        open_ones = _undecided_gains(estimate)
+        against, open_ones = _phases(estimate)
+        said += against
         columns = _columns(estimate)
         if columns is not None:
             said += _of_columns(columns)
@@ -227,23 +228,33 @@ def _of_gains(estimate: Estimate, found: Fit) -> Iterator[str]:
         )
 
 
-def _undecided_gains(estimate: Estimate) -> tuple[str, ...]:
-    """A sentence on shares of the watts that the meter may show as well: all is fitted again as if
-    it did.
+def _phases(estimate: Estimate) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What speaks against all phases being in, and what can't be decided of them: all is fitted
+    again as if the meter showed a share of the watts.
     """
-    costs = {share: _cost_of(estimate, share) for share in (1.0, *_PHASES)}
+    as_read = _cost_of(estimate, 1.0)
+    costs = {share: _cost_of(estimate, share) for share in _PHASES}
+    likeliest = min(_PHASES, key=lambda each: costs[each])
+    if costs[likeliest] < as_read - _UNLIKELY:
+        said = (
+            f"if the meter showed only {_GAINS[likeliest]} of the watts, they would be explained "
+            f"better (squared deviations {costs[likeliest]:.0f}, as read {as_read:.0f}): are all "
+            "three phases in?"
+        )
+        return (said,), ()
     alike = [
         f"{_GAINS[share]} ({costs[share]:.0f})"
         for share in _PHASES
-        if costs[share] < costs[1.0] + _UNLIKELY
+        if costs[share] < as_read + _UNLIKELY
     ]
     if not alike:
-        return ()
-    return (
+        return (), ()
+    said = (
         f"if the meter showed only {' or '.join(alike)} of the watts, they would be explained as "
-        f"well (squared deviations; as read {costs[1.0]:.0f}): these watts do not prove that all "
-        "three phases are in. Count them, or record with a heavy part of known mass and without it",
+        f"well (squared deviations; as read {as_read:.0f}): these watts do not prove that all "
+        "three phases are in. Count them, or record with a heavy part of known mass and without it"
     )
+    return (), (said,)
 
 
 def _cost_of(estimate: Estimate, share: float) -> float:
