@@ -279,9 +279,9 @@ class Blending:
             movement = Movement(path, longest, context, timing=timing)
             if driveable:
                 fast = self.lasting or context.options.objective == "time"
-                shorter = () if fast else _SHARES
-                found = [longest, *(overlap(int(share * by), True) for share in shorter)]
-                for each in found:
+                shares = () if fast else _SHARES
+                tried = [longest, *(overlap(int(share * by), True) for share in shares)]
+                for each in tried:
                     if each is not None:
                         yield self._in_time(replace(movement, trajectory=each), whole)
             elif len(whole.legs) <= _TIMED_ANEW and not context.work.exhausted:
