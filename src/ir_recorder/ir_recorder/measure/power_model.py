@@ -319,26 +319,6 @@ class PowerModel:
         """Predicted Nm (M, n) of the motors, as seen at the joints."""
         return self._torque(mean, prepared)[2]
 
-    def torque_slopes(self, mean: FloatArray, prepared: Prepared) -> FloatArray:
-        """Derivatives (M, n, P) of these torques by all parameters."""
-        of = self.layout.places
-        n = self.robot.n
-        through, side, _ = self._torque(mean, prepared)
-        slopes = np.zeros((*through.shape, len(mean)))
-        axis = np.arange(n)
-        for term, values in (
-            ("viscous", prepared.speed),
-            ("coulomb", side),
-            ("gear", np.abs(through) * side),
-        ):
-            slopes[:, axis, of(term).start + axis] = values
-        by_body = 1.0 + mean[of("gear")] * np.sign(through) * side
-        for name, body in self._bodies_of(mean, prepared):
-            slopes[:, :, self.layout.index(name)] = by_body * body
-        centres = self._one(mean, "link_mass") * np.moveaxis(prepared.centres, 0, 2)
-        slopes[:, :, self.layout.centre_places()] = by_body[:, :, None] * centres
-        return slopes
-
     def _bodies_of(
         self, mean: FloatArray, prepared: Prepared
     ) -> tuple[tuple[str, FloatArray], ...]:
