@@ -113,20 +113,18 @@ inline void arm_newton_euler_adjoint(const Joint<T>* joint, int count, const S* 
   }
 }
 
+// newton_euler_adjoint of a model with a rail, defined in dynamics_rail.cpp.
+template <class S, class T>
+void rail_newton_euler_adjoint(const Model<T>& m, const S* sn, const S* cs, const S* qd, const LinkTrace<S>* link,
+                               const S* u, S* by_q, S* by_qd, S* by_qdd);
+
 // Adds to by_q, by_qd, by_qdd the derivatives of sum_i u_i tau_i, tau from newton_euler on the same numbers (with
-// gravity) traced in `link`; sn, cs of q + theta0. kJoints and kRail as there.
-template <int kJoints = 0, bool kRail = false, class S, class T>
+// gravity) traced in `link`; sn, cs of q + theta0. kJoints as there.
+template <int kJoints = 0, class S, class T>
 inline void newton_euler_adjoint(const Model<T>& m, const S* sn, const S* cs, const S* qd, const LinkTrace<S>* link,
                                  const S* u, S* by_q, S* by_qd, S* by_qdd) {
-  if (kRail || (kJoints == 0 && m.rail.there)) {
-    const T* along = m.rail.along;
-    Vector<S> of_base{u[0] * along[0], u[0] * along[1], u[0] * along[2]};
-    arm_newton_euler_adjoint<kJoints, true>(m.joint + 1, m.n - 1, sn + 1, cs + 1, qd + 1, link, u + 1, by_q + 1, by_qd + 1,
-                                            by_qdd + 1, &of_base);
-    by_qdd[0] = by_qdd[0] + (of_base.x * along[0] + of_base.y * along[1] + of_base.z * along[2]) + u[0] * m.rail.mass;
-  } else {
-    arm_newton_euler_adjoint<kJoints, false, S>(m.joint, m.n, sn, cs, qd, link, u, by_q, by_qd, by_qdd, nullptr);
-  }
+  if (kJoints == 0 && m.rail.there) return rail_newton_euler_adjoint(m, sn, cs, qd, link, u, by_q, by_qd, by_qdd);
+  arm_newton_euler_adjoint<kJoints, false, S>(m.joint, m.n, sn, cs, qd, link, u, by_q, by_qd, by_qdd, nullptr);
 }
 
 }  // namespace ir::dynamics

@@ -22,12 +22,12 @@ struct Finite {
 };
 
 // sin and cos of q + theta0
-template <int kCount, class V, class T>
+template <int kJoints, class V, class T>
 inline void angles(const Model<T>& m, const V* q, V* s, V* c) {
-  const int n = kCount ? kCount : m.n;
+  const int n = kJoints ? kJoints : m.n;
   V theta[kMaxJoints];
   for (int i = 0; i < n; ++i) theta[i] = q[i] + m.joint[i].theta0;
-  sincos<kCount>(n, theta, s, c);
+  sincos<kJoints>(n, theta, s, c);
 }
 
 template <class V, class T>
@@ -36,19 +36,18 @@ inline V friction(const Drive<T>& d, V qd) {
   return qd * d.viscous + coulomb;
 }
 
-template <int kJoints, bool kRail, class V, class T>
+template <int kJoints, class V, class T>
 bool inverse_dynamics_of(const Model<T>& m, const double* q, const double* qd, const double* qdd, long N, double* tau) {
-  constexpr int kCount = kJoints ? kJoints + kRail : 0;
-  const int n = kCount ? kCount : m.n;
+  const int n = kJoints ? kJoints : m.n;
   V Q[kMaxJoints], D[kMaxJoints], A[kMaxJoints], s[kMaxJoints], c[kMaxJoints], t[kMaxJoints];
   Finite<V> finite;
   for (long first = 0; first < N; first += Lanes<V>::width) {
     load_columns(q, N, n, first, Q);
     load_columns(qd, N, n, first, D);
     load_columns(qdd, N, n, first, A);
-    angles<kCount>(m, Q, s, c);
-    newton_euler<kJoints, kRail>(m, s, c, D, A, t);
-    if (kRail || (kJoints == 0 && m.rail.there)) finite.look(Q, 1);  // where a rail stands changes nothing
+    angles<kJoints>(m, Q, s, c);
+    newton_euler<kJoints>(m, s, c, D, A, t);
+    if (kJoints == 0 && m.rail.there) finite.look(Q, 1);  // where a rail stands changes nothing
     const int b = m.balance.joint;
     if (m.coupling.any) {
       if (b >= 0) t[b] -= balance_torque(m.balance, s[b], c[b]);
@@ -64,23 +63,18 @@ bool inverse_dynamics_of(const Model<T>& m, const double* q, const double* qd, c
   return finite.all();
 }
 
-template <class V, class T>
-bool inverse_dynamics_in(const Model<T>& m, const double* q, const double* qd, const double* qdd, long N, double* tau) {
-  if (m.rail.there && m.n == 7) return inverse_dynamics_of<6, true, V>(m, q, qd, qdd, N, tau);
-  if (!m.rail.there && m.n == 6) return inverse_dynamics_of<6, false, V>(m, q, qd, qdd, N, tau);
-  return inverse_dynamics_of<0, false, V>(m, q, qd, qdd, N, tau);
-}
-
 }  // namespace
 
 bool inverse_dynamics(const Model<double>& m, const double* q, const double* qd, const double* qdd, long N,
                       double* tau) {
-  return inverse_dynamics_in<Doubles>(m, q, qd, qdd, N, tau);
+  return m.n == 6 && !m.rail.there ? inverse_dynamics_of<6, Doubles>(m, q, qd, qdd, N, tau)
+                                   : inverse_dynamics_of<0, Doubles>(m, q, qd, qdd, N, tau);
 }
 
 bool inverse_dynamics(const Model<float>& m, const double* q, const double* qd, const double* qdd, long N,
                       double* tau) {
-  return inverse_dynamics_in<Floats>(m, q, qd, qdd, N, tau);
+  return m.n == 6 && !m.rail.there ? inverse_dynamics_of<6, Floats>(m, q, qd, qdd, N, tau)
+                                   : inverse_dynamics_of<0, Floats>(m, q, qd, qdd, N, tau);
 }
 
 bool bias(const Model<double>& m, const double* q, const double* qd, long N, double* tau) {

@@ -182,27 +182,23 @@ inline void arm_newton_euler(const Joint<T>* joint, int count, const Vector<S>& 
   }
 }
 
+// newton_euler of a model with a rail, defined in dynamics_rail.cpp: inlined nowhere, so that what arms without one run stays
+// as it would be compiled without it.
+template <class S, class T, class Trace>
+void rail_newton_euler(const Model<T>& m, const S* sn, const S* cs, const S* qd, const S* qdd, S* tau, bool gravity,
+                       Trace& trace);
+
 // H qdd + h: sin and cos of q + theta0, torque per joint, force of a rail. Without `gravity` the weight is left out.
-// kJoints: of the arm, known at compile time, with a rail under it if kRail; 0: whatever the model has. What is traced are
-// the links of the arm, from 0 on.
-template <int kJoints = 0, bool kRail = false, class S, class T, class Trace = NoTrace>
+// kJoints: known at compile time, of an arm without a rail; 0: whatever the model has. What is traced are the links of the
+// arm, from 0 on.
+template <int kJoints = 0, class S, class T, class Trace = NoTrace>
 inline void newton_euler(const Model<T>& m, const S* sn, const S* cs, const S* qd, const S* qdd, S* tau,
                          bool gravity = true, Trace&& trace = {}) {
+  if (kJoints == 0 && m.rail.there) return rail_newton_euler(m, sn, cs, qd, qdd, tau, gravity, trace);
+  const S zero = qd[0] * T(0);
   const T on = gravity ? T(1) : T(0);
-  if (kRail || (kJoints == 0 && m.rail.there)) {
-    const T* along = m.rail.along;
-    const S zero = qd[1] * T(0);
-    const Vector<S> lift{zero + m.lift[0] * on, zero + m.lift[1] * on, zero + m.lift[2] * on};
-    const Vector<S> base{lift.x + qdd[0] * along[0], lift.y + qdd[0] * along[1], lift.z + qdd[0] * along[2]};
-    Vector<S> push;
-    arm_newton_euler<kJoints, true>(m.joint + 1, m.n - 1, base, sn + 1, cs + 1, qd + 1, qdd + 1, tau + 1, &push, trace);
-    const S weight = lift.x * along[0] + lift.y * along[1] + lift.z * along[2];
-    tau[0] = push.x * along[0] + push.y * along[1] + push.z * along[2] + (qdd[0] + weight) * m.rail.mass;
-  } else {
-    const S zero = qd[0] * T(0);
-    const Vector<S> lift{zero + m.lift[0] * on, zero + m.lift[1] * on, zero + m.lift[2] * on};
-    arm_newton_euler<kJoints, false, S>(m.joint, m.n, lift, sn, cs, qd, qdd, tau, nullptr, trace);
-  }
+  const Vector<S> lift{zero + m.lift[0] * on, zero + m.lift[1] * on, zero + m.lift[2] * on};
+  arm_newton_euler<kJoints, false, S>(m.joint, m.n, lift, sn, cs, qd, qdd, tau, nullptr, trace);
 }
 
 // What the counterbalance does about +axis, from sin and cos of q + theta0 of its joint.

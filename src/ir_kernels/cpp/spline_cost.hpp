@@ -53,14 +53,14 @@ class SplineCost {
   void smooth_envelope();
   void sample(const double* control, double interval);
   double drives(double step);
-  template <int kJoints, bool kRail> double drives_of(double step);
+  template <int kJoints> double drives_of(double step);
   double bus(double step);
   void exact_bus(double step);
   double smooth_bus(double step);
   double clearance(const std::int32_t* row, double step);
   double tilt(double step);
   double slower();
-  template <int kJoints, bool kRail> double slower_of();
+  template <int kJoints> double slower_of();
   double knots(int intervals, double interval, double* gradient, double& of_interval) const;
   void scatter(double interval, double* gradient);
 

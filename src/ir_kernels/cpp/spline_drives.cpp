@@ -35,12 +35,10 @@ IR_INLINE Above<Double8> above(Double8 x, double smoothing) {
 
 // Torques, their penalties and those of speed; the powers.
 double SplineCost::drives(double step) {
-  const bool rail = core_.model.rail.there;
-  if (rail && n_ == 7) return drives_of<6, true>(step);
-  return !rail && n_ == 6 ? drives_of<6, false>(step) : drives_of<0, false>(step);
+  return n_ == 6 && !core_.model.rail.there ? drives_of<6>(step) : drives_of<0>(step);
 }
 
-template <int kJoints, bool kRail>
+template <int kJoints>
 double SplineCost::drives_of(double step) {  // long: value and derivative side by side
   const auto& arm = core_.model;
   Lane cost{}, of_step{};
@@ -48,7 +46,7 @@ double SplineCost::drives_of(double step) {  // long: value and derivative side 
     Lane theta[dynamics::kMaxJoints];
     for (int j = 0; j < n_; ++j) theta[j] = g.q[j] + arm.joint[j].theta0;
     sincos(n_, theta, g.s, g.c);
-    dynamics::newton_euler<kJoints, kRail>(arm, g.s, g.c, g.qd, g.qdd, g.tau, true, dynamics::Trace<Lane>{g.link});
+    dynamics::newton_euler<kJoints>(arm, g.s, g.c, g.qd, g.qdd, g.tau, true, dynamics::Trace<Lane>{g.link});
     if (arm.balance.joint >= 0) {
       const int b = arm.balance.joint;
       g.tau[b] -= dynamics::balance_torque(arm.balance, g.s[b], g.c[b]);
@@ -193,12 +191,10 @@ double SplineCost::smooth_bus(double step) {
 // From powers and torques back to positions, speeds and accelerations. Returns what the cost gains from a motion that is
 // slower, per relative change of the time between knots.
 double SplineCost::slower() {
-  const bool rail = core_.model.rail.there;
-  if (rail && n_ == 7) return slower_of<6, true>();
-  return !rail && n_ == 6 ? slower_of<6, false>() : slower_of<0, false>();
+  return n_ == 6 && !core_.model.rail.there ? slower_of<6>() : slower_of<0>();
 }
 
-template <int kJoints, bool kRail> double SplineCost::slower_of() {
+template <int kJoints> double SplineCost::slower_of() {
   const auto& arm = core_.model;
   double gain = 0.0;
   for (std::size_t k = 0; k < groups_.size(); ++k) {
@@ -227,7 +223,7 @@ template <int kJoints, bool kRail> double SplineCost::slower_of() {
       const Dual s{g.s[b], g.c[b]}, c{g.c[b], -g.s[b]};
       g.of_q[b] -= g.of_tau[b] * dynamics::balance_torque(arm.balance, s, c).d;
     }
-    dynamics::newton_euler_adjoint<kJoints, kRail>(arm, g.s, g.c, g.qd, g.link, g.of_tau, g.of_q, g.of_qd, g.of_qdd);
+    dynamics::newton_euler_adjoint<kJoints>(arm, g.s, g.c, g.qd, g.link, g.of_tau, g.of_q, g.of_qd, g.of_qdd);
     Lane lane_gain{};
     for (int j = 0; j < n_; ++j) lane_gain += g.of_qd[j] * g.qd[j] + 2.0 * g.of_qdd[j] * g.qdd[j];
     gain += sum(lane_gain);
