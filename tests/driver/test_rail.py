@@ -94,3 +94,14 @@ def test_a_trajectory_off_the_rail_is_refused_in_metres(cell: Cell) -> None:
     )
     with pytest.raises(TrajectoryRefusedError, match=r"E1\) is at 6.000000 m"):
         make_simulation(cell, backend="ideal").vet(TrajectoryGoal(trajectory), 0)
+
+
+@pytest.mark.parametrize("seed", [0, 7])
+def test_a_drawn_plant_on_a_rail_drives_what_is_planned(
+    seed: int, cell: Cell, planner: Planner
+) -> None:
+    plan = planner.plan_regional(start="home", goal=AWAY)
+    assert plan.trajectory is not None
+    simulation = make_simulation(cell, plant=f"typical:{seed}")
+    outcome = driven(simulation, plan.trajectory)
+    assert outcome.code == ErrorCode.SUCCESSFUL, outcome.sentence

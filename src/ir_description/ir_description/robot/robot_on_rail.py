@@ -26,6 +26,7 @@ _SURPLUS = 1.5  # largest force over what friction and the acceleration limit ta
 _KNEE = 0.6  # of full speed: from here on the force falls
 _AT_FULL_SPEED = 0.6  # of the largest force
 _JERK_TIME = 0.1  # s to full acceleration
+_ESTIMATED = "L"  # mark of a figure that is an estimate
 _FIRST_PAIR = 2  # link of the arm from which on it can come to its own carriage
 
 
@@ -60,9 +61,12 @@ def on_rail(arm: RobotModel, rail: Rail) -> RobotModel:
         for own in arm.capsules
         if own.link >= _FIRST_PAIR
     )
+    place = f"links.{RAIL_LINK}"
+    marks = {f"{place}.{figure}": _ESTIMATED for figure in ("mass_kg", "com_m", "inertia_kgm2")}
     return replace(
         arm,
         rail=rail,
+        marks={**arm.marks, **marks},
         joint_names=(rail.name, *arm.joint_names),
         link_names=(RAIL_LINK, *arm.link_names),
         joint_origin=np.concatenate([np.eye(4)[None], arm.joint_origin]),
