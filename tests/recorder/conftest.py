@@ -36,7 +36,9 @@ from ir_msgs.msg import (
 )
 from ir_msgs_py.modes import Mode
 from ir_recorder import Analysis, analyse, findings, read_recording
+from ir_recorder.analysis.production import production_of
 from ir_recorder.analysis.tending import MachineTimes, PartRow, Span, TendedStep, Tending
+from ir_recorder.format import contents
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.format.schemas import SchemaLibrary
 from ir_recorder.recording.cell_files import CellFiles
@@ -497,3 +499,33 @@ def browser() -> Iterator[Any]:
         pytest.skip("needs Chromium: apt install chromium")
     with tool.Browser() as started:
         yield started
+
+
+@pytest.fixture(scope="session")
+def scattered() -> Callable[[Analysis, int], Analysis]:
+    """Gives a recording savings of about the energy that was driven: drawn, of a plan that takes up
+    to a tenth less or more energy and time, and of a common program that takes more.
+    """
+
+    def drawn(analysis: Analysis, seed: int) -> Analysis:
+        draw = np.random.default_rng(seed).uniform
+        found = analysis.savings
+        cycle = production_of(analysis)
+        assert found is not None
+        assert cycle is not None
+        planned = cycle.energy * draw(0.9, 1.1)
+        common = cycle.energy * draw(1.2, 1.6)
+        moving = found.movements
+        seconds = moving.seconds * draw(0.9, 1.1)
+        own = replace(
+            moving,
+            common=common - found.pauses.common,
+            planned=planned - found.pauses.planned,
+            seconds=seconds,
+        )
+        longest = (seconds + found.pauses.seconds) * 1.1
+        event = replace(analysis.recording.savings[0], savings=replace(found, movements=own))
+        facts = (*analysis.recording.facts, (contents.COMMON_SECONDS, f"{longest:.3f} s"))
+        return analyse(replace(analysis.recording, savings=(event,), facts=facts))
+
+    return drawn

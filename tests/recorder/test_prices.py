@@ -15,10 +15,11 @@ import numpy as np
 import pytest
 
 from ir_recorder import Analysis, findings
+from ir_recorder.analysis.production import PREDICTED
 from ir_recorder.report import report_html
 from ir_recorder.report.compare import comparison_html
 from ir_recorder.report.costs import Costs
-from ir_recorder.report.fleet import fleet_html, member_of
+from ir_recorder.report.fleet import Member, fleet_html, member_of
 from ir_recorder.report.money_text import Repriced, money, with_elements, yearly_money
 from ir_recorder.report.robots import robots_html
 
@@ -122,25 +123,78 @@ def rows_of(page: str) -> dict[str, float]:
     return {name: sum(map(float, values.split(","))) for name, values in rows}
 
 
-@pytest.mark.parametrize("made", [report, fleet])
-def test_what_is_reached_and_what_is_left_are_what_is_saved(
-    analysis: Analysis, made: Callable[[Analysis, Costs], str]
+def plain(page: str) -> str:
+    """The page without the elements of its amounts of money."""
+    return re.sub(r"</?data[^>]*>", "", page)
+
+
+def shown_in(words: str) -> float:
+    """The first amount of a text, as it is shown."""
+    found = re.search(r"(-?[\d\s\u00a0\u202f.]+) ?EUR", words)
+    assert found is not None, words
+    return float(re.sub(r"\s", "", found[1]))
+
+
+def bars_of(page: str) -> dict[str, float]:
+    """What stands beside the bars of a year, by the first word of each."""
+    year = plain(page.split('<section id="year">')[1].partition("</section>")[0])
+    rows = re.findall(r'class="label">(.*?)</span>.*?<b>(.*?)</b>', year)
+    return {name: shown_in(words) for name, words in rows}
+
+
+def undriven(member: Member, robot: str) -> Member:
+    """A robot whose plan nobody drove."""
+    cycle = member.cycle
+    assert cycle.savings is not None
+    planned = cycle.savings.total.planned
+    own = replace(cycle, origin=PREDICTED, energy=planned, low=planned, high=planned)
+    return replace(member, robot=robot, cycle=own)
+
+
+def mixed(analysis: Analysis, costs: Costs) -> str:
+    member = member_of(analysis, "robot")
+    assert member is not None
+    return fleet_html([member, undriven(member, "second")], costs=costs)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("made", [report, fleet, mixed])
+def test_what_is_reached_and_what_is_left_are_the_differences_of_the_bars(
+    analysis: Analysis,
+    scattered: Callable[[Analysis, int], Analysis],
+    made: Callable[[Analysis, Costs], str],
+    seed: int,
 ) -> None:
-    """Of a driven plan nothing is asked for twice, and nothing is left out."""
-    page = made(analysis, Costs())
-    rows = rows_of(page)
+    """Of what is computed and of the digits that are shown: a reader subtracts what a page says.
+    Of a driven plan nothing is asked for twice, and nothing is left out.
+    """
+    price = np.random.default_rng(seed).uniform(0.3, 3.0)
+    page = made(scattered(analysis, seed), Costs(price=price))
     answer = page.split('<section id="answer">')[1].partition("</section>")[0]
-    reached, whole = (
-        float(value) for value in re.findall(r'value="y:([^"]*)"', answer.partition("</b>")[0])
-    )
-    before = next(energy for name, energy in rows.items() if name.startswith("common program"))
-    planned = next(energy for name, energy in rows.items() if name.startswith("planned program"))
-    assert rows["reached"] == pytest.approx(reached)
-    assert rows["reached"] + rows["still to save"] == pytest.approx(whole)
-    assert before - planned == pytest.approx(whole)
+    result = plain(answer.partition("</b>")[0])
+    for rows, close in ((rows_of(page), 1e-6), (bars_of(page), 1e-9)):
+        before = next(money for name, money in rows.items() if name.startswith("common program"))
+        planned = next(money for name, money in rows.items() if name.startswith("planned program"))
+        now = next(money for name, money in rows.items() if name.startswith(("as driven", "today")))
+        assert rows["reached"] == pytest.approx(before - now, rel=close)
+        assert rows["still to save"] == pytest.approx(now - planned, rel=close)
+    amounts = [shown_in(part) for part in result.partition("<b>")[2].split(" of ")]
+    assert amounts == [rows["reached"], pytest.approx(rows["reached"] + rows["still to save"])]
     done, left = answer.partition("Reached")[2].split("Still to save")
     assert "ibernation" in left
     assert "ibernation" not in done
+
+
+def test_a_page_counts_one_number_of_cycles_a_year(
+    analysis: Analysis, scattered: Callable[[Analysis, int], Analysis]
+) -> None:
+    """However much longer than its plan a run took."""
+    for seed in range(3):
+        page = plain(report(scattered(analysis, seed), Costs()))
+        shown = re.sub(r"<(script|style).*?</\1>", "", page, flags=re.DOTALL)
+        found = re.findall(r"(\d[\d\s\u00a0\u202f]*) cycles, one each", shown)
+        assert len(found) > 1
+        assert len(set(found)) == 1
 
 
 def test_a_year_without_a_comparison_counts_nights(analysis: Analysis) -> None:

@@ -252,13 +252,20 @@ class Costs:
         return amount.times(self.cycles_per_year(cycle.pace))
 
     def saving_of_year(self, cycle: Production) -> Amount | None:
-        """Joules of a year that the plan saves, predicted: of as many cycles as the program makes
-        that it is held against, however long a run of it took; None where it is not known.
+        """Joules of a year that the plan saves, predicted: of as many cycles as the year of the
+        cycle has; None where it is not known.
         """
         if cycle.savings is None:
             return None
-        total = cycle.savings.total
-        return saved_amount(total).times(self.cycles_per_year(total.seconds or cycle.seconds))
+        return saved_amount(cycle.savings.total).times(self.cycles_per_year(cycle.pace))
+
+    def common_of_year(self, cycle: Production) -> float | None:
+        """Joules of as many cycles of the program that the plan is held against; None where it is
+        not known.
+        """
+        if cycle.savings is None:
+            return None
+        return cycle.savings.total.common * self.cycles_per_year(cycle.pace)
 
 
 def following_price(costs: Costs) -> Costs:
@@ -405,11 +412,11 @@ def _before(cycle: Production, costs: Costs, driven: bool) -> list[tuple[str, ..
     if cycle.savings is None:
         return []
     total = cycle.savings.total
-    pace = total.seconds or cycle.seconds
-    alone = cycle.savings.common_seconds or pace
-    rows = [_cycle_row(f"{COMMON}, predicted", alone, total.common, pace, costs)]
+    own = total.seconds or cycle.seconds
+    alone = cycle.savings.common_seconds or own
+    rows = [_cycle_row(f"{COMMON}, predicted", alone, total.common, cycle.pace, costs)]
     if driven:
-        row = _cycle_row(f"{PLANNED}, predicted", pace, total.planned, pace, costs)
+        row = _cycle_row(f"{PLANNED}, predicted", own, total.planned, cycle.pace, costs)
         rows.append(row)
     return rows
 
@@ -475,11 +482,10 @@ def _saved(cycle: Production, costs: Costs) -> list[tuple[str, ...]]:
     savings = cycle.savings
     if savings is None:
         return []
-    pace = savings.total.seconds or cycle.seconds
     parts = [("by its movements", savings.movements)]
     if savings.pauses.seconds > 0.0:
         parts += [("in its pauses", savings.pauses), ("together", savings.total)]
-    return [_saving(name, saving, pace, costs) for name, saving in parts]
+    return [_saving(name, saving, cycle.pace, costs) for name, saving in parts]
 
 
 def _saving(where: str, saving: Saving, pace: float, costs: Costs) -> tuple[str, ...]:

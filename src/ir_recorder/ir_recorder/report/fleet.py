@@ -51,7 +51,7 @@ from ir_recorder.report.costs import (
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import started
 from ir_recorder.report.methods import counted
-from ir_recorder.report.money_text import money_of, sum_of_money, yearly_money, yearly_span
+from ir_recorder.report.money_text import NOTHING, money_of, sum_of_money, yearly_money, yearly_span
 from ir_recorder.report.number_text import (
     DASH,
     ENGLISH,
@@ -66,6 +66,8 @@ from ir_recorder.report.number_text import (
 )
 from ir_recorder.report.page import PAGE_START, folded
 from ir_recorder.report.paid import (
+    ABOVE,
+    ABOVE_LEAST,
     Paid,
     Tile,
     a_night,
@@ -73,7 +75,7 @@ from ir_recorder.report.paid import (
     between_of,
     counted_at,
     percent_of,
-    reached_of,
+    reached_saving,
     row_of,
     with_span,
 )
@@ -274,8 +276,9 @@ def member_of(analysis: Analysis, robot: str, said: Said = lambda _: None) -> Me
 @dataclass(frozen=True)
 class Robot:
     """All members of one robot: recordings, mean seconds and joules of a cycle; joules of a year,
-    and those that its plans save of the common program's, each with its 90 % interval.
-    drives_only: they are those of drives and tool, and no part of a sum at the mains.
+    and those that its plans save of the common program's, each with its 90 % interval; common [J]:
+    of that program, None where nobody knows it. drives_only: they are those of drives and tool, and
+    no part of a sum at the mains.
     """
 
     name: str
@@ -286,12 +289,46 @@ class Robot:
     joules: float
     yearly: Amount
     saved: Amount | None
+    common: float | None
     drives_only: bool = False
 
     @property
     def driven(self) -> bool:
         """Whether all of its files are of runs, none of a plan that nobody drove."""
         return PREDICTED not in self.origins
+
+    @property
+    def before(self) -> float:
+        """Joules of a year of the common program; of a robot whose files don't say it those of its
+        files.
+        """
+        return self.yearly.value if self.common is None else self.common
+
+    @property
+    def now(self) -> Amount:
+        """Joules of a year as it is today: as driven, and where nobody drove its plan those of the
+        common program.
+        """
+        if self.driven or self.common is None:
+            return self.yearly
+        return Amount.of_value(self.common)
+
+    @property
+    def reached(self) -> Amount | None:
+        """How much less than the common program was driven [J]; None where nothing was, or nobody
+        knows it.
+        """
+        if not self.driven or self.saved is None or self.common is None:
+            return None
+        return reached_saving(self.saved, self.common, self.yearly.value)
+
+    @property
+    def above(self) -> float:
+        """Joules of a year that were driven above the plan; 0 where no plan was driven."""
+        reached = self.reached
+        if reached is None or self.saved is None:
+            return 0.0
+        return self.saved.value - reached.value
 
 
 def robots_of(members: Sequence[Member], costs: Costs) -> list[Robot]:
@@ -303,6 +340,8 @@ def robots_of(members: Sequence[Member], costs: Costs) -> list[Robot]:
         own = [member for member in members if member.robot == name]
         savings = [costs.saving_of_year(member.cycle) for member in own]
         saved = [amount for amount in savings if amount is not None]
+        years = [costs.common_of_year(member.cycle) for member in own]
+        common = [year for year in years if year is not None]
         found.append(
             Robot(
                 name,
@@ -313,6 +352,7 @@ def robots_of(members: Sequence[Member], costs: Costs) -> list[Robot]:
                 sum(member.cycle.energy for member in own) / len(own),
                 mean_of([costs.energy_of_year(member.cycle) for member in own]),
                 mean_of(saved) if saved else None,
+                sum(common) / len(common) if common else None,
                 any(member.cycle.drives_only for member in own),
             )
         )
@@ -329,17 +369,9 @@ def _saved_and_common(members: Sequence[Member], costs: Costs) -> tuple[Amount |
     """Joules of a year that all plans together save, and those of the programs that they are held
     against; None where no recording says it. Several recordings of a robot are averaged.
     """
-    known = [(m.robot, m.cycle) for m in at_mains(members) if m.cycle.savings is not None]
-    count = Counter(robot for robot, _ in known)
-    saved = []
-    common = 0.0
-    for robot, cycle in known:
-        amount = costs.saving_of_year(cycle)
-        if amount is not None and cycle.savings is not None:
-            saved.append(amount.times(1.0 / count[robot]))
-            total = cycle.savings.total
-            cycles = costs.cycles_per_year(total.seconds or cycle.seconds) / count[robot]
-            common += total.common * cycles
+    robots = robots_of(at_mains(members), costs)
+    saved = [robot.saved for robot in robots if robot.saved is not None]
+    common = sum(robot.common for robot in robots if robot.common is not None)
     return (sum_of(saved) if saved else None), common
 
 
@@ -430,7 +462,9 @@ def fleet_html(
     summed = [robot for robot in robots if not robot.drives_only]
     sections = [
         _section("Robots, those that cost most first", _robots(members, robots, prices), "robots"),
-        _section("What could still be saved, at most", _potential(known, summed, prices), "first"),
+        _section(
+            "What could still be saved, each by itself", _potential(known, summed, prices), "first"
+        ),
         _section("Month by month: driven and predicted", _months(members), "months"),
         _problems([each for each in left_out if DRIVES_ONLY not in each]),  # the table says it
         _all_robots(members, robots, prices),
@@ -469,7 +503,7 @@ def _answer(paid: Paid, robots: Sequence[Robot], costs: Costs) -> Answer:
     summed = [robot for robot in robots if not robot.drives_only]
     if not summed:
         return Answer("The costs of a year are not known", _apart(robots))
-    yearly = sum_of([robot.yearly for robot in summed])
+    yearly = sum_of([robot.now for robot in summed])
     price = yearly.of(costs.money)
     taken = f"{kilowatt_hours(yearly.value)}, {kilograms(costs.co2(yearly.value))} of CO2"
     if paid.saved is None and paid.idle is None:
@@ -485,12 +519,12 @@ def _answer(paid: Paid, robots: Sequence[Robot], costs: Costs) -> Answer:
     word, gain = year.money.gain()
     less = "less" if word == "saved" else "more"
     than = paid.before if paid.saved is not None else "closed brakes at night"
-    result = f"{yearly_money(gain.value, costs.currency)} a year {less} than {than}"
+    result = f"{paid.gain_words(costs)} a year {less} than {than}"
     if paid.saved is not None and paid.saved.doubt:
         result = f"Open whether anything is saved: {result}"
     reached = paid.has_reached
     if reached is not None:
-        result = reached_of(reached.of(costs.money), gain, costs)
+        result = paid.reached_words(costs)
     saved = year.with_energy(costs)
     before = paid.before_amounts(costs)
     share = (
@@ -526,8 +560,9 @@ def _steps(paid: Paid, robots: Sequence[Robot], costs: Costs) -> tuple[list[str]
         found.append((paid.idle.saved, words))
     done = []
     for driven in (True, False):
-        own = [robot for robot in robots if robot.driven == driven]
-        gains = [robot.saved for robot in own if robot.saved is not None and not robot.drives_only]
+        own = [robot for robot in robots if robot.driven == driven and not robot.drives_only]
+        savings = [robot.reached if driven else robot.saved for robot in own]
+        gains = [saved for saved in savings if saved is not None]
         if not gains or paid.saved is None or paid.saved.doubt:
             continue
         saved = sum_of(gains).of(costs.money)
@@ -538,6 +573,10 @@ def _steps(paid: Paid, robots: Sequence[Robot], costs: Costs) -> tuple[list[str]
             done.append(words)
         else:
             found.append((saved.value, words))
+    above = costs.money(sum(robot.above for robot in robots if not robot.drives_only))
+    if done and above >= ABOVE_LEAST * costs.money(paid.common):
+        words = f"{ABOVE[0].upper()}{ABOVE[1:]}: {yearly_money(above, costs.currency)} a year."
+        found.append((above, words))
     return [words for _, words in sorted(found, reverse=True)], done
 
 
@@ -576,13 +615,13 @@ _MUCH = 0.5  # of what is saved: what isn't measured then is said beside the tit
 def _tiles(
     paid: Paid, members: Sequence[Member], robots: Sequence[Robot], costs: Costs
 ) -> list[Tile | None]:
-    """A year of the fleet in shifts, what is saved, and its largest quarter of an hour."""
+    """A year of the fleet in shifts as it is today, and its largest quarter of an hour."""
     summed = [robot for robot in robots if not robot.drives_only]
     if not summed:
         return []
-    yearly = sum_of([robot.yearly for robot in summed])
+    yearly = sum_of([robot.now for robot in summed])
     price = yearly.of(costs.money)
-    of = f"{counted(len(summed), 'robot')}, {_as_made(members)}"
+    of = f"{counted(len(summed), 'robot')}, {_as_now(summed)}"
     energy = f"{kilowatt_hours(yearly.value)}, {kilograms(costs.co2(yearly.value))} of CO2"
     costs_tile = Tile(
         "costs in shifts a year",
@@ -612,10 +651,21 @@ def _outside(idle: IdleSaving | None) -> str:
     )
 
 
-def _as_made(members: Sequence[Member]) -> str:
-    """What the energies of a fleet are: of runs that were driven, of plans, or of both."""
-    planned = [member.cycle.origin == PREDICTED for member in members]
-    return "as planned" if all(planned) else "as driven or planned" if any(planned) else "as driven"
+def _as_now(robots: Sequence[Robot]) -> str:
+    """What the energies of today are of: of runs that were driven, of common programs, of plans
+    that nobody holds against one, or of several of these.
+    """
+    kinds = (
+        ("as driven", any(robot.driven for robot in robots)),
+        ("as planned", any(not r.driven and r.common is None for r in robots)),
+        (f"{COMMON} where no plan was driven", any(_stands(robot) for robot in robots)),
+    )
+    return ", ".join(name for name, some in kinds if some)
+
+
+def _stands(robot: Robot) -> bool:
+    """Whether the common program stands for what a robot takes today."""
+    return not robot.driven and robot.common is not None
 
 
 def _demand(members: Sequence[Member], robot: Robot) -> float:
@@ -624,7 +674,7 @@ def _demand(members: Sequence[Member], robot: Robot) -> float:
 
 def _paid(members: Sequence[Member], costs: Costs) -> Paid:
     """What those who pay ask first, of all robots together."""
-    saved, common = _saved_and_common(members, costs)
+    saved, _ = _saved_and_common(members, costs)
     idle = _idle_saving(members, costs)
     robots = robots_of(members, costs)
     if saved is None:
@@ -633,11 +683,18 @@ def _paid(members: Sequence[Member], costs: Costs) -> Paid:
     of = f", {counted(len(robots), 'robot')}"
     if without:
         of += f", {_names(without)} alike in all: no file says what its plan saves"
-    unplanned = sum(robot.yearly.value for robot in without)
-    recorded = (f"these files, {_as_made(members)}", sum_of([r.yearly for r in robots]).value)
-    driven = [robot.saved for robot in robots if robot.driven and robot.saved is not None]
-    reached = sum_of(driven) if driven else None
-    return Paid(saved, common + unplanned, idle, of, f"{COMMON}s", recorded, reached=reached)
+    common = sum(robot.before for robot in robots)
+    driven = [robot.reached for robot in robots if robot.reached is not None]
+    now = (f"today: {_as_now(robots)}", sum_of([robot.now for robot in robots]).value)
+    return Paid(
+        saved,
+        common,
+        idle,
+        of,
+        f"{COMMON}s",
+        now if driven else None,
+        reached=sum_of(driven) if driven else None,
+    )
 
 
 _ROBOT_HEADS = (
@@ -662,8 +719,9 @@ def _robots(members: Sequence[Member], robots: Sequence[Robot], costs: Costs) ->
         name = f"<b>all</b><small>{recordings}</small>"
         rows.append((name, *_sums(summed, members, costs), DASH))
     hint = (
-        "Reached: saved by the plan that was driven, predicted, against the same stations by PTP "
-        "at full speed with the controller's own timers. Still to save: what nobody did yet. "
+        "Reached: the common program (the same stations by PTP at full speed with the controller's "
+        "own timers, predicted), less what was driven. Where nobody drove a plan the common "
+        "program stands for today. Still to save: what nobody did yet. "
         "Small: 90 % intervals, which add up as if all were wrong alike."
     )
     if any(robot.saved is not None and robot.saved.doubt for robot in robots):
@@ -686,11 +744,13 @@ def _robot_row(robot: Robot, members: Sequence[Member], costs: Costs) -> tuple[s
     idle = None if robot.drives_only else _idle_saving(own, costs)
     part = robot.joules / costs.parts_per_cycle
     made = ", ".join((robot.cell, _origins(own), *([DRIVES_ONLY] if robot.drives_only else ())))
-    each = f"a part {kilowatt_hours(part)}, {money_of_thousand(part, costs)}"
+    how = "" if robot.driven else " as planned"
+    each = f"a part{how} {kilowatt_hours(part)}, {money_of_thousand(part, costs)}"
+    today = f"<small>{COMMON}, predicted</small>" if _stands(robot) else ""
     return (
         f"{text(robot.name)}<small>{text(made)}</small><small>{text(each)}</small>",
-        _yearly(robot.yearly, costs),
-        _saved(robot.saved, costs) if robot.driven else DASH,
+        f"{_yearly(robot.now, costs)}{today}",
+        _saved(robot.reached, costs),
         _left([robot], idle, costs),
         text(_first_lever(robot, own, idle, costs)),
     )
@@ -714,17 +774,19 @@ def _first_lever(robot: Robot, own: Sequence[Member], idle: IdleSaving | None, c
 
 def _sums(robots: Sequence[Robot], members: Sequence[Member], costs: Costs) -> tuple[str, ...]:
     """Costs, energy and savings of several robots."""
-    reached = [robot.saved for robot in robots if robot.driven and robot.saved is not None]
+    reached = [robot.reached for robot in robots if robot.reached is not None]
     known = [member for robot in robots for member in _own(members, robot)]
     return (
-        _yearly(sum_of([robot.yearly for robot in robots]), costs),
+        _yearly(sum_of([robot.now for robot in robots]), costs),
         _saved(sum_of(reached) if reached else None, costs),
         _left(robots, _idle_saving(known, costs), costs),
     )
 
 
 def _left(robots: Sequence[Robot], idle: IdleSaving | None, costs: Costs) -> str:
-    """What rest outside of the shifts and plans that nobody drove would save, together and each."""
+    """What rest outside of the shifts, plans that nobody drove and runs at their plan's energy
+    would save, together and each.
+    """
     plans = [r.saved for r in robots if not r.driven and r.saved is not None]
     open_plans = sum_of(plans).of(costs.money) if plans else None
     parts = []
@@ -732,6 +794,11 @@ def _left(robots: Sequence[Robot], idle: IdleSaving | None, costs: Costs) -> str
         parts.append((idle.money, "at night"))
     if open_plans is not None and open_plans.value > 0.0 and not open_plans.doubt:
         parts.append((open_plans, "by its plan" if len(robots) == 1 else "by plans"))
+    above = costs.money(sum(robot.above for robot in robots))
+    if abs(above) >= NOTHING:
+        parts.append(
+            (Amount.of_value(above), "above its plan" if len(robots) == 1 else "above plans")
+        )
     if not parts:
         return DASH
     shown = _money(sum_of([money for money, _ in parts]), costs)

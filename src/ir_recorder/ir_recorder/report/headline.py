@@ -62,6 +62,7 @@ from ir_recorder.report.paid import (
     between_of,
     counted_at,
     first_steps,
+    reached_saving,
 )
 
 _STYLES = {Verdict.HOLDS: "good", Verdict.FAILS: "bad", Verdict.NOT_CHECKED: "open"}
@@ -232,7 +233,7 @@ def answer(analysis: Analysis, costs: Costs) -> str:
         shown = _without_saving(analysis, cycle, paid, costs).html()
         return shown + paid.picture(costs)
     total = cycle.savings.total
-    count = costs.cycles_per_year(total.seconds or cycle.seconds)
+    count = costs.cycles_per_year(cycle.pace)
     steps = [
         (saved_amount(saving).times(count).of(costs.money), words)
         for words, saving in (
@@ -241,7 +242,8 @@ def answer(analysis: Analysis, costs: Costs) -> str:
         )
     ]
     each = 1.0 / costs.parts_per_cycle
-    part = (total.common * each, total.planned * each)
+    then = total.planned if analysis.program is None else cycle.energy
+    part = (total.common * each, then * each)
     return paid.answer(costs, steps, part).html() + paid.picture(costs)
 
 
@@ -321,11 +323,10 @@ def _paid(analysis: Analysis, costs: Costs) -> Paid:
         counted = "" if cycle is None else f", {cycles_of_year(cycle.pace, costs)}"
         return Paid(None, 0.0, idle, counted, driven=driven)
     total = cycle.savings.total
-    pace = total.seconds or cycle.seconds
-    common = total.common * costs.cycles_per_year(pace)
-    said = f", {cycles_of_year(pace, costs)}"
+    common = total.common * costs.cycles_per_year(cycle.pace)
+    said = f", {cycles_of_year(cycle.pace, costs)}"
     run = ""
-    more = more_parts(cycle.savings)
+    more = more_parts(cycle.savings, cycle.pace)
     if analysis.program is not None:
         run = (
             f"As driven ({analysis.recording.origin}) a cycle takes "
@@ -334,21 +335,20 @@ def _paid(analysis: Analysis, costs: Costs) -> Paid:
     else:
         driven = None
     proved = analysis.recording.only_planned and analysis.recording.planned_certified
-    reached = saved if driven is not None else None
+    reached = reached_saving(saved, common, driven[1]) if driven is not None else None
     return Paid(saved, common, idle, said, COMMON, driven, cycle.supply, proved, run, more, reached)
 
 
-def more_parts(savings: ProgramSavings) -> str:
-    """How many more parts an hour a plan makes than the common program, in words; "" where both
-    make as many.
+def more_parts(savings: ProgramSavings, pace: float) -> str:
+    """How many more parts an hour a program with so many seconds [s] from one cycle to the next
+    makes than the common program, in words; "" where both make as many.
     """
     if savings.common_seconds <= 0.0:
         return ""
-    planned = savings.total.seconds
-    more = 100.0 * (savings.common_seconds / planned - 1.0)
+    more = 100.0 * (savings.common_seconds / pace - 1.0)
     return (
-        f"{more:.1f} % more parts an hour, one cycle each {seconds(planned)} instead of "
-        f"{seconds(savings.common_seconds)}"
+        f"{abs(more):.1f} % {'more' if more >= 0.0 else 'fewer'} parts an hour, one cycle each "
+        f"{seconds(pace)} instead of {seconds(savings.common_seconds)}"
     )
 
 

@@ -23,6 +23,7 @@ from ir_recorder.report.costs import (
 )
 from ir_recorder.report.money_text import (
     NOTHING,
+    difference_of_money,
     money_of,
     price_field,
     sum_of_money,
@@ -54,7 +55,12 @@ CERTIFIED = "No collision: certified by bounds at every instant, not by samples.
 SAVED = "saved"
 REACHED = "reached"
 LEFT = "still to save"
-"""Rows of a year: what the planned program saves, or what of it was driven, and what is left."""
+"""Rows of a year: what the planned program saves, or how much less than the common program was
+driven, and what is left.
+"""
+ABOVE = "find what the run takes above its plan"
+"""What to do about a run that took more than its plan predicts."""
+ABOVE_LEAST = 0.01  # of the common program: less is nothing to look for
 _ROUNDED = " Each amount is rounded by itself."
 _COMMON = " Common program: the same stations by PTP at 100 %, its pauses left to the controller."
 
@@ -66,8 +72,8 @@ class Paid:
     made of, in words; before: what it is held against. driven: what else a year of it is called,
     and what that takes [J]: nothing is known of its nights, so they are as before. supply: what
     limits the figures. proved: whether the planned program is certified. run: what was driven, in
-    a sentence. more: what else the plan gains. reached [J]: how much of `saved` was driven; None
-    where nothing was.
+    a sentence. more: what else the plan gains. reached [J]: how much less than `common` was driven
+    (`reached_saving`); None where nothing was.
     """
 
     saved: Amount | None
@@ -98,15 +104,15 @@ class Paid:
             f"{sum_of_money(before, costs.currency)} of the {self.before}"
         )
         said = (share, f"{energy} {less}" if energy else "", payback(year.money, costs), self.more)
-        result = f"{yearly_money(gain.value, costs.currency)} {less} a year"
+        result = f"{self.gain_words(costs)} {less} a year"
         if self.saved is not None and self.saved.doubt:
             result = f"Open whether anything is saved: {result}"
         reached = self.has_reached
         if reached is not None:
-            result = reached_of(reached.of(costs.money), gain, costs)
+            result = self.reached_words(costs)
         words = "; ".join(each for each in said if each)
-        own = first_steps(steps, None, costs)
-        nights = first_steps((), self.idle, costs)
+        own = [f"{step}, predicted" for step in first_steps(steps, None, costs)]
+        nights = first_steps(self._above_steps(costs), self.idle, costs)
         return Answer(
             result,
             f"{words}.",
@@ -124,6 +130,46 @@ class Paid:
         saves = self.saved is not None and self.saved.value > 0.0 and not self.saved.doubt
         return self.reached if saves else None
 
+    def _above_steps(self, costs: Costs) -> list[Step]:
+        """What a run took above its plan, as something to do; none where that is little."""
+        if self.driven is None or self.saved is None:
+            return []
+        above = self.driven[1] - (self.common - self.saved.value)
+        if above < ABOVE_LEAST * self.common:
+            return []
+        return [(Amount.of_value(costs.money(above)), ABOVE)]
+
+    def gain_words(self, costs: Costs) -> str:
+        """What is saved of a year in all, or taken more, in money."""
+        before, then = self.before_amounts(costs), self._then(costs)
+        if sum(before) < sum(then):
+            before, then = then, before
+        return difference_of_money(before, then, costs.currency)
+
+    def reached_money(self, costs: Costs) -> str:
+        """What was reached, in money, as the bars of a year say it; it must be known."""
+        assert self.driven is not None
+        shifts = costs.money(self.common), costs.money(self.driven[1])
+        return difference_of_money(shifts[:1], shifts[1:], costs.currency)
+
+    def reached_words(self, costs: Costs) -> str:
+        """How much of a saving was driven: "105 EUR of 323 EUR a year reached"."""
+        reached = self.has_reached
+        assert reached is not None
+        mine = costs.money(reached.value)
+        if mine < NOTHING:
+            return f"Nothing of {self.gain_words(costs)} a year reached"
+        shown = self.reached_money(costs)
+        if self.year(costs).money.value - mine < NOTHING:
+            return f"{shown} less a year: reached"
+        return f"{shown} of {self.gain_words(costs)} a year reached"
+
+    def _then(self, costs: Costs) -> tuple[float, float]:
+        """Money of a year of the plan: in shifts, and outside of them where that is known."""
+        saved = 0.0 if self.saved is None else self.saved.value
+        nights = 0.0 if self.idle is None else self.idle.deepest
+        return costs.money(self.common - saved), nights
+
     def before_amounts(self, costs: Costs) -> tuple[float, float]:
         """Money of a year before: in shifts, and outside of them where that is known."""
         nights = 0.0 if self.idle is None else self.idle.left_alone
@@ -136,6 +182,8 @@ class Paid:
             limit = f"; {self.supply}" if self.supply else ""
             spread = ", the interval is of the robot's data alone" if self._spreads(costs) else ""
             said.append(f"What plans save is predicted{spread}{limit}.")
+        if self.has_reached is not None:
+            said.append(f"Reached: the {self.before}, predicted, less what was driven.")
         said.append(self.run)
         if self.idle is not None:
             late = "a robot that is woken late delays the first cycle"
@@ -168,27 +216,27 @@ class Paid:
         driven.
         """
         assert self.saved is not None
-        nights = (0.0, 0.0) if self.idle is None else (self.idle.left_alone, self.idle.deepest)
-        shifts = self.before_amounts(costs)[0], costs.money(self.common - self.saved.value)
-        rows = [
-            _year_row(self.before, "today", (shifts[0], nights[0]), costs),
-            _year_row(planned_name(self.before), "planned", (shifts[1], nights[1]), costs),
-        ]
+        before, then = self.before_amounts(costs), self._then(costs)
+        rows = [_year_row(self.before, "today", before, costs)]
+        now = before
         if self.driven is not None:
             name, energy = self.driven
-            rows.append(_year_row(name, "driven", (costs.money(energy), nights[0]), costs))
+            now = costs.money(energy), before[1]
+            rows.append(_year_row(name, "driven", now, costs))
+        rows.append(_year_row(planned_name(self.before), "planned", then, costs))
         saved = self.year(costs).money
         reached = self.has_reached
+        idle = 0.0 if self.idle is None else self.idle.saved
         if reached is not None:
             mine = reached.of(costs.money)
-            rows.append(_saved_row(REACHED, mine, 0.0, costs))
-            idle = 0.0 if self.idle is None else self.idle.saved
+            if mine.value >= NOTHING:
+                rows.append(_saved_row(REACHED, mine, 0.0, self.reached_money(costs), costs))
             left = Amount(saved.value - mine.value, saved.low - mine.low, saved.high - mine.high)
             if left.value >= NOTHING:
-                rows.append(_saved_row(LEFT, left, min(idle, left.value), costs))
+                price = difference_of_money(now, then, costs.currency)
+                rows.append(_saved_row(LEFT, left, min(idle, left.value), price, costs))
         elif saved.value > 0.0:
-            idle = 0.0 if self.idle is None else self.idle.saved
-            rows.append(_saved_row(SAVED, saved, idle, costs))
+            rows.append(_saved_row(SAVED, saved, idle, self.gain_words(costs), costs))
         return rows
 
     def _rows_of_nights(self, costs: Costs) -> list[Row]:
@@ -201,7 +249,7 @@ class Paid:
         return [
             _year_row(name, "driven", (shifts, idle.left_alone), costs),
             _year_row(f"with {idle.mode} at night", "planned", (shifts, idle.deepest), costs),
-            _saved_row(LEFT, idle.money, idle.saved, costs),
+            _saved_row(LEFT, idle.money, idle.saved, _less(idle, costs), costs),
         ]
 
     def year(self, costs: Costs) -> SavedYear:
@@ -217,12 +265,12 @@ def planned_name(before: str) -> str:
 KEEP = "Keep the program as it is."
 
 
-def reached_of(reached: Amount, gain: Amount, costs: Costs) -> str:
-    """How much of a saving was driven, in money: "106 EUR of 323 EUR a year reached"."""
-    shown, of = (yearly_money(each.value, costs.currency) for each in (reached, gain))
-    if gain.value - reached.value < NOTHING:
-        return f"{of} less a year: reached"
-    return f"{shown} of {of} a year reached"
+def reached_saving(saved: Amount, common: float, driven: float) -> Amount:
+    """How much less than the common program was driven [J]: with the interval of what its plan
+    saves, about the value that was driven.
+    """
+    off = common - driven - saved.value
+    return Amount(common - driven, saved.low + off, saved.high + off)
 
 
 def counted_at(costs: Costs) -> str:
@@ -241,13 +289,19 @@ def counted_at(costs: Costs) -> str:
     )
 
 
-def _saved_row(name: str, saved: Amount, nights: float, costs: Costs) -> Row:
-    """What is saved of a year, with the whisker of its interval; nights: outside of shifts."""
+def _less(idle: IdleSaving, costs: Costs) -> str:
+    """What rest saves, as the bars of a year say it."""
+    return difference_of_money([idle.left_alone], [idle.deepest], costs.currency)
+
+
+def _saved_row(name: str, saved: Amount, nights: float, price: str, costs: Costs) -> Row:
+    """What is saved of a year, with the whisker of its interval; nights: outside of shifts; price:
+    in words.
+    """
     pieces = (
         Piece("saved", f"{name} in shifts", saved.value - nights),
         Piece("saved night", f"{name} at night and at weekends", nights),
     )
-    price = yearly_money(saved.value, costs.currency)
     return Row(name, pieces, price, (between_of(saved, costs),), whisker=(saved.low, saved.high))
 
 
