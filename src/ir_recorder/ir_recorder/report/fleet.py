@@ -585,7 +585,8 @@ def _plans(robots: Sequence[Robot]) -> str:
     driven, where all were.
     """
     known = [robot for robot in robots if not robot.drives_only]
-    gains = {robot: robot.saved.value for robot in known if robot.saved is not None}
+    savings = {robot: robot.reached if robot.driven else robot.saved for robot in known}
+    gains = {robot: saved.value for robot, saved in savings.items() if saved is not None}
     saving = sorted((robot for robot in gains if gains[robot] > 0.0), key=lambda r: -gains[r])
     if len(saving) == 1:
         of = f"the plan of {saving[0].name} instead of its common program"
