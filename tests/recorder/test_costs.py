@@ -340,7 +340,8 @@ def test_a_fleet_counts_the_same_robots_in_shifts_and_at_night(
     assert "second alike in all: no file says what its plan saves" in picture
     driven = picture.partition("today: as driven")[2]
     assert f"{yearly_money(nights, 'EUR')} outside" in driven  # nobody recorded a night
-    assert "of it from nights, by the data sheet" in page
+    assert "of the saving is of nights, by the data sheet" in page
+    assert "Simulated, not measured" in page
     assert "The plan of first instead of its common program" in page
     assert "the 576 h a year (15 % of the shifts) in which the cell stands still" in page
     measures = page.split("<h2>What could still be saved, each by itself")[1].partition(

@@ -213,7 +213,7 @@ def test_differences_that_are_alike_up_to_rounding_show_nothing() -> None:
 def test_small_differences_keep_a_digit_and_movements_in_the_interval_are_counted() -> None:
     rows = pairs(*(3e-5 + 1e-6 * (-1) ** k for k in range(300)))
     rows[0]["synchronous"]["direct_j"] = 300.0
-    assert "   599  measured within the predicted 90 % interval" in said(rows)
+    assert "   599  simulated within the predicted 90 % interval" in said(rows)
     assert "+0.003 to +0.003" in said(rows[1:])
     assert [percent(value) for value in (0.0, -3e-5, 12.0)] == ["0.00", "0.00", "+12.00"]
 

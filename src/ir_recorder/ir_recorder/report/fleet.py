@@ -486,7 +486,7 @@ def fleet_html(
         f"{_title(robots)}: {_origins(members)}",
         "a year of each robot, one cycle after the other",
         f"{first}{year}{row_of(shown) if shown else ''}{''.join(sections)}",
-        badges=[_badge(paid, prices)],
+        badges=[*_simulated(members), _badge(paid, prices)],
         style=_STYLE,
     )
 
@@ -596,6 +596,14 @@ def _plans(robots: Sequence[Robot]) -> str:
     return f"{of[0].upper()}{of[1:]}" if driven else f"Drive {of}"
 
 
+def _simulated(members: Sequence[Member]) -> list[str]:
+    """That nothing was measured, where all that was driven was simulated."""
+    origins = {member.cycle.origin for member in members} - {PREDICTED}
+    if origins != {"simulated"}:
+        return []
+    return ['<p class="source simulated"><b>Simulated, not measured</b></p>']
+
+
 def _badge(paid: Paid, costs: Costs) -> str:
     if paid.saved is None:
         return badge("No plan's saving known", "open")
@@ -606,7 +614,9 @@ def _badge(paid: Paid, costs: Costs) -> str:
     if paid.idle is not None and not paid.idle.measured:
         nights = paid.idle.saved / (paid.idle.saved + costs.money(paid.saved.value))
         if nights > _MUCH:
-            return badge(f"{100.0 * nights:.0f} % of it from nights, by the data sheet", "open")
+            return badge(
+                f"{100.0 * nights:.0f} % of the saving is of nights, by the data sheet", "open"
+            )
     return badge("The plans save", "good")
 
 

@@ -206,11 +206,11 @@ def counts(found: Findings) -> list[tuple[str, str]]:
         ("compared", str(compared_)),
         ("different movements among these", str(found.different)),
         ("asynchronous takes longer", str(found.slower)),
-        ("movements measured", str(found.driven)),
+        ("movements driven in simulation", str(found.driven)),
     ]
     if found.driven and math.isfinite(found.covered):
         inside = round(found.covered * found.driven)
-        rows.append(("measured within the predicted 90 % interval", str(inside)))
+        rows.append(("simulated within the predicted 90 % interval", str(inside)))
     return rows
 
 
@@ -330,7 +330,7 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
     varied = [each for each in found.comparisons if not each.count or each.less + each.more]
     same = [each.name for each in found.comparisons if each not in varied]
     head = Head(
-        "Predicted energies, held against a meter",
+        "Predicted energies, held against simulated ones",
         f"{settings.cell}: {found.pairs} random pairs of places, planner "
         f"{settings.planner or 'portfolio'}, objective {settings.objective.replace('_', ' ')}, "
         f"{_robot(settings)}",
@@ -410,7 +410,7 @@ def _in_money(off: Mean) -> list[str]:
     low, high = sorted(map(on_the_meter, (off.low, off.high)))
     ends = f" (90 % interval {low:.2f} to {high:.2f} EUR)" if math.isfinite(off.low) else ""
     return [
-        f"Where a page predicts 100 EUR, the meter of such a robot counts "
+        f"Where a page predicts 100 EUR, such a simulated robot takes "
         f"{on_the_meter(off.value):.2f} EUR{ends}.",
         "What a plan saves changes by the same share, as both of its programs do.",
     ]
