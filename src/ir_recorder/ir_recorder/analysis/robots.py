@@ -173,4 +173,4 @@ def _turns(analyses: Mapping[str, Analysis]) -> Iterator[Finding]:
         (one, spans), (other, its_spans) = passes.items()
         together = sum(span.within(its.begin, its.end) for span in spans for its in its_spans)
         why = f"{one} and {other} pass it in turns: {len(spans)} and {len(its_spans)} times"
-        yield at_most(f"both robots in {signal}", together, STAMPS, "s", why)
+        yield at_most(f"time of both robots in {signal} at once", together, STAMPS, "s", why)
