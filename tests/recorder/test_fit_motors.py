@@ -94,7 +94,6 @@ def test_a_travel_over_which_dry_friction_turns_is_found_where_there_is_one() ->
     model, prior = model_of(robot)
     truth = truth_of(prior, 3)
     coulomb = truth[prior.places("coulomb")]
-    constants = np.array([1.0, 0.96, 1.05, 1.0, 0.95, 1.0])
     travels = (2e-4, 5e-4, 0.0, 2e-3, 1e-3, 0.0)
     runs = []
     for seed in (1, 2):
@@ -105,7 +104,7 @@ def test_a_travel_over_which_dry_friction_turns_is_found_where_there_is_one() ->
             if travel:
                 soft = given_way(run.qd[:, j], run.step, travel)
                 effort[:, j] += coulomb[j] * (soft - np.sign(run.qd[:, j]))
-        runs.append(replace(run, effort=effort * constants))
+        runs.append(replace(run, effort=effort))
     estimate = Estimate(runs, ["a", "b"], model, prior, motors=True)
     found = estimate.result("x")
     for travel, own in zip(travels, found.travel, strict=True):

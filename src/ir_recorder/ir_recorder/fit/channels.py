@@ -25,7 +25,6 @@ LEAST_WATTS = 0.5  # noise of a residual, at least: the resolution of meters
 _LEAST_SHARE = 1e-3  # of the largest effort of an axis: the resolution of controllers
 _OFFSET = 0.02  # of the largest effort: what a sensor or a centre of mass may add to an axis
 _TRAVELS = (3e-5, 1e-4, 3e-4, 1e-3)  # rad: of gears and bearings that give way before they slide
-_CONSTANT = 0.05  # of a torque: motor constants differ, and fall by 0.1 % per K
 _NEARER = 0.98  # of the error with friction that turns at once: with more, it does
 
 FRICTION = ("viscous", "coulomb")
@@ -294,7 +293,7 @@ class Motors:
         """Values and deviations (2 n,) of offsets and scales before the fit."""
         scales = self.scales(mean)
         size = np.where(scales == 0.0, 1.0, np.abs(scales))
-        spread = (0.5 if self.currents else _CONSTANT) * size
+        spread = 0.5 * size if self.currents else np.zeros(self.n)
         return (
             np.concatenate([np.zeros(self.n), scales]),
             np.concatenate([_OFFSET * self.largest / size, spread]),

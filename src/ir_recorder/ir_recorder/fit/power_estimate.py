@@ -213,8 +213,8 @@ class Fit:
     without).
     inflation: of the noise, so that the covariance explains the residuals of movements and rests.
     friction_scale: times the deviation of friction before. offsets (n,) Nm, scales (n,) and travel
-    (n,) rad of the motors, where these were fitted; scales: what the controller says per Nm,
-    amperes (currents) or Nm by its own motor constants; travel: over which dry friction turns.
+    (n,) rad of the motors, where these were fitted; scales: amperes per Nm of what the
+    controller says, 1 where it says Nm; travel: over which dry friction turns.
     """
 
     parameters: PowerParameters
