@@ -140,7 +140,11 @@ class Paid:
         return [(Amount.of_value(costs.money(above)), ABOVE)]
 
     def gain_words(self, costs: Costs) -> str:
-        """What is saved of a year in all, or taken more, in money."""
+        """What is saved of a year in all, or taken more, in money: as the table of changes adds it
+        up, and where a run was driven as the bars say it.
+        """
+        if self.driven is None:
+            return yearly_money(abs(self.year(costs).money.value), costs.currency)
         before, then = self.before_amounts(costs), self._then(costs)
         if sum(before) < sum(then):
             before, then = then, before
