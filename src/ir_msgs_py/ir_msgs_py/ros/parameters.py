@@ -27,8 +27,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.service_introspection import ServiceIntrospectionState
 
-from ir_msgs_py.ros.c_messages import Convert, CSequence, converter, lookalike
-from ir_msgs_py.ros.rclpy_inside import given_names
+from ir_msgs_py.ros.rclpy_inside import Convert, CSequence, converter, given_names, lookalike
 from ir_msgs_py.ros.serving import ANY, Calls
 from ir_values.errors import InvalidValueError, IrError, one_line
 from ir_values.settings import Setting, changed, check_settings, setting, tree

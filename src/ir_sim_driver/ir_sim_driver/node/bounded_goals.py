@@ -19,8 +19,14 @@ import numpy as np
 from rclpy.serialization import deserialize_message
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from ir_msgs_py.ros.c_messages import Convert, CSequence, converter, lookalike
-from ir_msgs_py.ros.rclpy_inside import part, participant_of
+from ir_msgs_py.ros.rclpy_inside import (
+    Convert,
+    CSequence,
+    converter,
+    lookalike,
+    part,
+    participant_of,
+)
 from ir_msgs_py.ros.serving import RecordedActionServer, TakenGoals
 
 _NAMES_MAX = 100  # joints, tolerances and states of a goal: a robot has ten
