@@ -22,6 +22,7 @@ from ir_cli.output import (
 )
 from ir_cli.planning import (
     FAILED,
+    add_blend,
     add_cell,
     add_margin,
     add_options,
@@ -59,7 +60,6 @@ from ir_planner.krl import (
     follow_krl,
     follow_ur,
 )
-from ir_planner.program import AS_THE_CELL_SAYS
 from ir_values.errors import FileRefusedError
 from ir_values.files import ANYWHERE
 from ir_values.output_files import write_file
@@ -217,14 +217,7 @@ def add_export(write: argparse.ArgumentParser) -> None:
     write.add_argument(
         "--cycle-time", type=float, default=0.0, metavar="S", help="for the cycle; 0: free (0)"
     )
-    write.add_argument(
-        "--blend",
-        type=float,
-        default=AS_THE_CELL_SAYS,
-        metavar="M",
-        help="pass stops and ends of lines within so many metres where nothing happens; -1: as the "
-        "cell says (-1)",
-    )
+    add_blend(write)
     write.add_argument(
         "--style",
         choices=STYLES,

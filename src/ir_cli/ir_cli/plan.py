@@ -24,6 +24,7 @@ from ir_cli.output import (
     text,
 )
 from ir_cli.planning import (
+    add_blend,
     add_cell,
     add_options,
     add_parameters,
@@ -44,7 +45,6 @@ from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import PlannedMovement
 from ir_planner import Planner, PlannerSettings, ProgramPlan
 from ir_planner.before_after import assumed_doors
-from ir_planner.program import AS_THE_CELL_SAYS
 from ir_values.files import ANYWHERE
 
 J_PER_KWH = 3.6e6
@@ -77,14 +77,7 @@ def add_plan(plan: argparse.ArgumentParser) -> None:
     plan.add_argument(
         "--cycle-time", type=float, default=0.0, metavar="S", help="for the cycle; 0: free (0)"
     )
-    plan.add_argument(
-        "--blend",
-        type=float,
-        default=AS_THE_CELL_SAYS,
-        metavar="M",
-        help="pass stops and ends of lines within so many metres where nothing happens; -1: as the "
-        "cell says (-1)",
-    )
+    add_blend(plan)
     words = "of several robots: all together never need more; 0: no limit (0)"
     plan.add_argument("--peak-power", type=float, default=0.0, metavar="KW", help=words)
     add_start(plan)

@@ -22,6 +22,7 @@ from ir_msgs_py.options import NO_TILT, OBJECTIVES, ROBOTS_TIME_VALUE, PlanOptio
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.savings import one_sided
 from ir_planner import Goal, Planner, PlannerSettings, RequestError, parse_goal
+from ir_planner.program import AS_THE_CELL_SAYS
 from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError
 
@@ -114,6 +115,18 @@ def add_start(parser: argparse.ArgumentParser, of: str = "") -> None:
     """Where a program begins."""
     words = f"{of}posture or joint values (where the program ends, as in production; else park)"
     parser.add_argument("--start", default="", help=words)
+
+
+def add_blend(parser: argparse.ArgumentParser) -> None:
+    """How near a program passes what it needn't stand still at."""
+    parser.add_argument(
+        "--blend",
+        type=float,
+        default=AS_THE_CELL_SAYS,
+        metavar="M",
+        help="pass stops and ends of lines within so many metres where nothing happens; -1: as the "
+        "cell says (-1)",
+    )
 
 
 def start_of(text: str, planner: Planner, stations: Sequence[str], margin: float) -> FloatArray:
