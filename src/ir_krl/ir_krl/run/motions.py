@@ -308,21 +308,30 @@ class Motions:
         self._check_components(value, relative, place)
         base, tool = self.frames(place)
         name = str(tree.children[0]) if tree.data == "access" else ""
-        if is_axis_value(value):
-            given = axes(value, place)
+        place_of_rail = rail(value, place) if self._on_rail else None
+
+        def target(
+            given: dict[str, float] | None,
+            frame: dict[str, float] | None = None,
+            status: int | None = None,
+            turn: int | None = None,
+        ) -> Target:
             return Target(
                 given,
-                None,
-                None,
-                None,
+                frame,
+                status,
+                turn,
                 relative,
                 in_tool,
                 base,
                 tool,
                 name,
                 self._external_tool,
-                rail(value, place) if self._on_rail else None,
+                place_of_rail,
             )
+
+        if is_axis_value(value):
+            return target(axes(value, place))
         frame = components(value, FRAME_NAMES, place)
         if not frame:
             point = name or "POINT"
@@ -339,19 +348,7 @@ class Motions:
             else None
             for part in ("S", "T")
         )
-        return Target(
-            None,
-            frame,
-            status,
-            turn,
-            relative,
-            in_tool,
-            base,
-            tool,
-            name,
-            self._external_tool,
-            rail(value, place) if self._on_rail else None,
-        )
+        return target(None, frame, status, turn)
 
     def _check_components(self, value: Structure, relative: bool, place: SourcePlace) -> None:
         """Raise KrlRunError for a component that no position has; note external axes."""
