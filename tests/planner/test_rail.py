@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -238,3 +239,18 @@ def test_a_station_that_one_place_of_the_rail_does_not_reach_is_no_goal(planner:
 def test_coordinate_descent_says_that_it_turns_joints(planner: Planner) -> None:
     with pytest.raises(RequestError, match="E1 slides"):
         planner.compute_ik(goal="press_place", method="ccd")
+
+
+@pytest.mark.parametrize(
+    ("goal", "said"),
+    [
+        (AWAY.replace("E1 3.5", "E1 nan"), "E1 is 'nan': it must be a finite number m"),
+        (AWAY.replace("A1 20", "A1 x"), "A1 is 'x': it must be a finite number deg"),
+        ("press_place E1 2500", "E1 is 2500 m: it must be in [0, 5] m"),
+    ],
+)
+def test_a_goal_on_a_rail_is_refused_in_the_unit_of_each_axis(
+    planner: Planner, goal: str, said: str
+) -> None:
+    with pytest.raises(RequestError, match=re.escape(said)):
+        planner.plan_regional(start="park", goal=goal)

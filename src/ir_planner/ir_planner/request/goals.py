@@ -8,6 +8,7 @@ chooses.
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -98,7 +99,7 @@ def parse_goal(text: str, cell: Cell, what: str = "goal") -> Goal:
         q = within_limits(joints, cell, what, StatusCode.GOAL_STATE_INVALID)
         return Goal(configuration=q, text=stripped)
     if len(words) > 1 and keys[0] in _POSE_KEYS:
-        pose = _pose(_numbers(keys, words[1::2], list(_POSE_KEYS), ""))
+        pose = _pose(_numbers(keys, words[1::2], dict.fromkeys(_POSE_KEYS, "")))
         return Goal(pose=pose, text=stripped, rail=rail)
     texts = ('"A1 0 A2 -90 ..." in degrees', '"X 1.8 Y 0 Z 1.2 A 0 B 90 C 0"')
     raise unknown_name(what, stripped, [*(s.name for s in cell.stations), *POSTURES, *texts])
@@ -110,10 +111,10 @@ def joints_of(text: str, cell: Cell) -> FloatArray | None:
     """
     words, keys = _words(text)
     robot = cell.robot
-    joints = [robot.axis_label(i).upper() for i in range(robot.n)]
+    joints = {robot.axis_label(i).upper(): robot.unit(i) for i in range(robot.n)}
     if len(words) < 2 or keys[0] not in joints:
         return None
-    return robot.from_people_units(np.array(_numbers(keys, words[1::2], joints, "deg")))
+    return robot.from_people_units(np.array(_numbers(keys, words[1::2], joints)))
 
 
 def _with_rail(text: str, cell: Cell, what: str) -> tuple[str, float | None]:
@@ -123,7 +124,7 @@ def _with_rail(text: str, cell: Cell, what: str) -> tuple[str, float | None]:
     if robot.rail is None or len(words) < 3 or words[-2].upper() != robot.rail.name.upper():
         return text, None
     label = robot.rail.name
-    place = _numbers([label], words[-1:], [label], "of m")[0]
+    place = _numbers([label], words[-1:], {label: "m"})[0]
     if not robot.rail.low <= place <= robot.rail.high:
         raise RequestError(
             StatusCode.GOAL_STATE_INVALID,
@@ -205,8 +206,8 @@ def _angle(value: float) -> str:
     return f"{math.degrees(value):g} deg" if abs(value) < _NO_ANGLE else f"{value:g} rad"
 
 
-def _numbers(keys: list[str], values: list[str], expected: list[str], unit: str) -> list[float]:
-    """Numbers in the order of `expected`; every key once."""
+def _numbers(keys: list[str], values: list[str], expected: Mapping[str, str]) -> list[float]:
+    """Numbers in the order of `expected`, which has the unit of each; every key once."""
     if sorted(keys) != sorted(expected) or len(values) != len(keys):
         raise RequestError(
             StatusCode.INVALID_GOAL_CONSTRAINTS,
@@ -220,9 +221,10 @@ def _numbers(keys: list[str], values: list[str], expected: list[str], unit: str)
         except ValueError:
             number = math.nan
         if not math.isfinite(number):
+            needed = f"a finite number {expected[key]}".rstrip()
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"goal: {key} is {value[:20]!a}: it must be a finite number {unit}".rstrip(),
+                f"goal: {key} is {value[:20]!a}: it must be {needed}",
             )
         numbers[key] = number
     return [numbers[key] for key in expected]
