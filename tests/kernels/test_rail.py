@@ -426,7 +426,8 @@ def test_the_cost_of_a_spline_and_its_derivatives_agree_with_the_reference(
     case = case_of(name)
     if case.arm.name.startswith("kr210"):
         flat = on_flat_ground()
-        robot, collision = flat.railed, collision_of(flat, COLUMNS)
+        robot = flat.railed
+        collision = collision_of(flat, COLUMNS)
         dynamics = DynamicsModel(robot, flat.loads, flat.base)
     else:
         robot = case.railed
@@ -491,7 +492,8 @@ def test_native_and_baseline_agree_bit_by_bit(baseline: Any) -> None:
 
 def test_inverse_kinematics_is_that_of_the_arm_at_each_place_of_the_rail() -> None:
     case = replace(case_of("kr210"), loads=())
-    low, high = case.railed.position_min, case.railed.position_max
+    low = case.railed.position_min
+    high = case.railed.position_max
     chain = Chain(case.railed, case.base, TCP)
     solver = inverse_kinematics(chain, low, high)
     assert isinstance(solver, RailIk)

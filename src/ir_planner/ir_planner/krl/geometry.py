@@ -242,7 +242,8 @@ class Arm:
         )
         if len(beyond):
             j = int(beyond[0])
-            low, high = robot.position_min[j], robot.position_max[j]
+            low = robot.position_min[j]
+            high = robot.position_max[j]
             raise KrlMotionError(
                 f"{_called(target)}{robot.axis_label(j)} {robot.shown(j, q[j])} is not within "
                 f"{robot.shown(j, low).split()[0]} to {robot.shown(j, high)}",

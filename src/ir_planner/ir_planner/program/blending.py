@@ -118,12 +118,11 @@ class Blending:
         self._special = {
             station.name for station in stations if station.allowed_contacts or station.limits.asked
         }
-        asked = choice.request.blend
-        self.places = {
-            after: place
-            for before, after in pairwise(choice.parts)
-            if (place := self._place(before, after, asked)) is not None
-        }
+        self.places: dict[HopPart, PassedPlace] = {}
+        for before, after in pairwise(choice.parts):
+            place = self._place(before, after, choice.request.blend)
+            if place is not None:
+                self.places[after] = place
 
     def joined(self, found: Found) -> list[JoinedMovement]:
         """Movements that cost less than those of their parts with the rests between them.
@@ -256,7 +255,8 @@ class Blending:
         """Overlapping movements of two runs that serve: within all limits as they are, and on a
         free path that is timed anew.
         """
-        before, after = first.movements[0], second.movements[0]
+        before = first.movements[0]
+        after = second.movements[0]
         ends = (before.trajectory, after.trajectory)
         shorter = min(first.legs[-1].trajectory.duration, second.legs[0].trajectory.duration)
         most = int(_MOST * shorter * NS_PER_S)

@@ -145,7 +145,8 @@ class Paid:
         """
         if self.driven is None:
             return yearly_money(abs(self.year(costs).money.value), costs.currency)
-        before, then = self.before_amounts(costs), self._then(costs)
+        before = self.before_amounts(costs)
+        then = self._then(costs)
         if sum(before) < sum(then):
             before, then = then, before
         return difference_of_money(before, then, costs.currency)
@@ -220,7 +221,8 @@ class Paid:
         driven.
         """
         assert self.saved is not None
-        before, then = self.before_amounts(costs), self._then(costs)
+        before = self.before_amounts(costs)
+        then = self._then(costs)
         rows = [_year_row(self.before, "today", before, costs)]
         now = before
         if self.driven is not None:

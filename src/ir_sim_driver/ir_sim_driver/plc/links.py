@@ -46,7 +46,7 @@ WRITERS = (
 
 def usable_links() -> tuple[type[Link], ...]:
     """All links; warns (RuntimeWarning) of an installed package that can't be used."""
-    refused = {name: why for name in LINKS if (why := LINKS.why_not(name))}
-    for why in refused.values():
+    refused = {name: LINKS.why_not(name) for name in LINKS}
+    for why in filter(None, refused.values()):
         warnings.warn(why, RuntimeWarning, stacklevel=2)
-    return tuple(LINKS[name] for name in LINKS if name not in refused)
+    return tuple(LINKS[name] for name in LINKS if not refused[name])
