@@ -42,8 +42,10 @@ _SHORTEST = 2_000_000  # ns of an overlap
 _LESS = 1e-6  # relative, that a joined movement costs at least
 _SAME_TIME = 1e-5  # s
 _TIMED_ANEW = 6  # movements of a run at most whose path gets another time scaling
-_STAGE = "blending"
-_NOTHING = "nothing is cheaper without standing still"
+STAGE = "blending"
+"""Of the journal."""
+NOTHING_CHEAPER = "nothing is cheaper without standing still"
+"""What is noted there."""
 
 
 def blend_at(route: Route, place: int, asked: float) -> float:
@@ -328,7 +330,7 @@ class Blending:
             return False
         violation = movement.prove().violation
         if violation is not None:
-            movement.context.journal.reject(f"{_STAGE}: {violation.what}")
+            movement.context.journal.reject(f"{STAGE}: {violation.what}")
         return violation is None
 
 
@@ -430,11 +432,11 @@ def blended(timed: TimedChoice) -> TimedChoice:
     context = timed.choice.movements.context
     if not blending.places or context.work.exhausted:
         return timed
-    with context.journal.stage(_STAGE) as notes:
+    with context.journal.stage(STAGE) as notes:
         joined = blending.joined(timed.timed.movements)
         passing = replace(timed, joined=tuple(joined))
         if not joined or passing.energy >= timed.energy:
-            notes.append(_NOTHING)
+            notes.append(NOTHING_CHEAPER)
             return timed
         notes.append(blending.said(joined))
     return passing
@@ -451,9 +453,9 @@ def _shortest(choice: Choice, cycle_time: float, standing: float) -> TimedChoice
     values = TimeValues(choice.ladder, choice.parts)
     values.bracket(0.0, FASTEST - 1)
     found = values.fastest
-    with context.journal.stage(_STAGE) as notes:
+    with context.journal.stage(STAGE) as notes:
         joined = blending.joined(found)
-        notes.append(blending.said(joined) if joined else _NOTHING)
+        notes.append(blending.said(joined) if joined else NOTHING_CHEAPER)
     if not joined:
         return None
     within = {part for join in joined for part in join.parts}

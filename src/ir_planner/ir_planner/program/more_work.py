@@ -11,7 +11,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 from ir_planner.errors import RequestError
-from ir_planner.program.blending import Blending, timed_with_blends
+from ir_planner.program.blending import (
+    NOTHING_CHEAPER,
+    STAGE,
+    Blending,
+    timed_with_blends,
+)
 from ir_planner.program.chain import cheapest_chain, layers_of
 from ir_planner.program.choice import Choice, Found, Steps
 from ir_planner.program.cycle_time import cycle_gap, free_gap
@@ -167,11 +172,11 @@ def _without_rests(answer: ChainAnswer, found: Found) -> ChainAnswer:
     context = choice.movements.context
     if not blending.places or context.work.exhausted:
         return answer
-    with context.journal.stage("blending") as notes:
+    with context.journal.stage(STAGE) as notes:
         joined = blending.joined(found)
         passing = replace(answer, steps=choice.steps(found, joined=joined)) if joined else answer
         if passing.cost >= answer.cost:
-            notes.append("nothing is cheaper without standing still")
+            notes.append(NOTHING_CHEAPER)
             return answer
         notes.append(blending.said(joined))
     return passing
