@@ -6,30 +6,15 @@ build, which runs these tests on it.
 """
 
 import sys
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from ir_kernels import compiled
-
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # the shapes of a scene in Coal
 
-
-def _built() -> dict[str, Any]:
-    """The compiled modules that are here: `native` where it runs, `baseline` where it was built."""
-    found = {}
-    for name in ("native", "baseline"):
-        with suppress(
-            ImportError
-        ):  # a machine without a compiler, or not the one that built `native`
-            found[name] = compiled.load(name)[1]
-    return found
-
-
-BUILT = _built()
+from builds import BUILT
 
 
 @pytest.fixture(params=[*BUILT, "reference"])

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from _coal_shapes import CoalScene
+from builds import BUILT, slow_reference
 from geometry_cases import (
     CAPSULES,
     COLUMNS,
@@ -80,8 +81,24 @@ def of_core(core: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
     return CAPSULES if core is not None else CAPSULES[9:]
 
 
-@pytest.mark.parametrize("bodies", [COLUMNS, GATE], ids=["columns", "gate"])
-@pytest.mark.parametrize("seed", range(3))
+def drawn() -> list[Any]:
+    """Every build with every scene and seed; of the reference, which takes seconds, one."""
+    scenes = {"columns": COLUMNS, "gate": GATE}
+    return [
+        pytest.param(
+            core,
+            bodies,
+            seed,
+            id=f"{core}-{seed}-{name}",
+            marks=[pytest.mark.long] if core == "reference" and (name, seed) != ("gate", 0) else [],
+        )
+        for core in (*BUILT, "reference")
+        for seed in range(3)
+        for name, bodies in scenes.items()
+    ]
+
+
+@pytest.mark.parametrize(("core", "bodies", "seed"), drawn(), indirect=["core"])
 def test_a_path_joins_the_ends_exactly_and_every_step_is_proved(
     of_core: Any, bodies: tuple[Body, ...], seed: int
 ) -> None:
@@ -131,6 +148,7 @@ def test_the_same_seed_gives_the_same_path_and_another_one_another(of_core: Any)
 
 
 @pytest.mark.parametrize("size", [1, 7, 64])
+@slow_reference
 def test_slices_give_the_path_of_one_call(of_core: Any, size: int) -> None:
     collision = model(GATE, of_core)
     whole = grown(collision, LEFT, RIGHT[None], 5)
@@ -161,8 +179,9 @@ def test_where_no_path_leads_the_budget_is_spent_and_the_gap_stated(of_core: Any
     straight = search.gap
     assert straight == pytest.approx(np.linalg.norm((goal - start) * SCALE), rel=1e-6)
     assert np.array_equal(search.gap_ends, [start, goal])
-    assert not search.grow(600)
-    assert search.edges == 600
+    budget = 600 if of_core == CAPSULES else 60
+    assert not search.grow(budget)
+    assert search.edges == budget
     assert not search.found
     assert search.goal_index == -1
     assert search.path.shape == (0, 6)
@@ -184,6 +203,7 @@ def test_of_several_goals_one_that_can_be_reached_is_named(of_core: Any) -> None
     assert np.array_equal(found.path[-1], near)
 
 
+@slow_reference
 def test_lines_become_branches_as_far_as_they_are_free(of_core: Any) -> None:
     collision = model(GATE, of_core)
     a = grown(collision, LEFT, RIGHT[None], 1).path
