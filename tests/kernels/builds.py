@@ -1,5 +1,6 @@
 """The builds of the core that are here, and how the tests choose among them."""
 
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -20,7 +21,21 @@ def _built() -> dict[str, Any]:
 
 
 BUILT = _built()
-LONG_REFERENCE = pytest.param("reference", marks=pytest.mark.long)
 
-slow_reference = pytest.mark.parametrize("core", [*BUILT, LONG_REFERENCE], indirect=True)
-"""The builds alone in `make test`: the NumPy reference takes seconds."""
+
+def every_build(names: str, cases: Iterable[Sequence[Any]], few: int = 1) -> pytest.MarkDecorator:
+    """A test of every build and case; of the NumPy reference, a hundred times slower, only the
+    first few cases are in `make test`.
+    """
+    params = [
+        pytest.param(
+            core, *case, marks=[pytest.mark.long] if core == "reference" and k >= few else []
+        )
+        for core in (*BUILT, "reference")
+        for k, case in enumerate(cases)
+    ]
+    return pytest.mark.parametrize(f"core, {names}".rstrip(", "), params, indirect=["core"])
+
+
+slow_reference = every_build("", [()], few=0)
+"""Of the reference this takes seconds, and another test shows it too."""

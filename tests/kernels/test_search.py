@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from _coal_shapes import CoalScene
-from builds import BUILT, slow_reference
+from builds import every_build, slow_reference
 from geometry_cases import (
     CAPSULES,
     COLUMNS,
@@ -81,24 +81,7 @@ def of_core(core: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
     return CAPSULES if core is not None else CAPSULES[9:]
 
 
-def drawn() -> list[Any]:
-    """Every build with every scene and seed; of the reference, which takes seconds, one."""
-    scenes = {"columns": COLUMNS, "gate": GATE}
-    return [
-        pytest.param(
-            core,
-            bodies,
-            seed,
-            id=f"{core}-{seed}-{name}",
-            marks=[pytest.mark.long] if core == "reference" and (name, seed) != ("gate", 0) else [],
-        )
-        for core in (*BUILT, "reference")
-        for seed in range(3)
-        for name, bodies in scenes.items()
-    ]
-
-
-@pytest.mark.parametrize(("core", "bodies", "seed"), drawn(), indirect=["core"])
+@every_build("bodies, seed", [(bodies, seed) for bodies in (GATE, COLUMNS) for seed in range(3)])
 def test_a_path_joins_the_ends_exactly_and_every_step_is_proved(
     of_core: Any, bodies: tuple[Body, ...], seed: int
 ) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builds import every_build, slow_reference
 from geometry_cases import COLUMNS, OPEN, Body, box
 from robots import RobotLiteral, kr210, power_gradients
 from spline_cases import (
@@ -83,8 +84,9 @@ def by_definition(
     return cost + t.clearance_penalty * step * float((lacks**2).sum())
 
 
-@pytest.mark.parametrize("regeneration", REGENERATIONS)
-@pytest.mark.parametrize("seed", range(3))
+@every_build(
+    "seed, regeneration", [(seed, how) for seed in range(3) for how in REGENERATIONS], few=3
+)
 def test_the_cost_is_what_it_says(core: Any, seed: int, regeneration: Regeneration) -> None:
     robot = plain(kr210())
     collision, dynamics = kr210_models(few=core is None, robot=robot)
@@ -103,8 +105,8 @@ def test_the_cost_is_what_it_says(core: Any, seed: int, regeneration: Regenerati
         assert cost.value(control, interval, row).value == pytest.approx(expected, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("n", "wrist"), [(1, False), (4, False), (6, True), (7, True), (8, False), (16, False)]
+@every_build(
+    "n, wrist", [(1, False), (6, True), (4, False), (7, True), (8, False), (16, False)], few=2
 )
 def test_the_cost_of_other_robots_is_what_it_says(core: Any, n: int, wrist: bool) -> None:
     robot, collision, _ = chain_models(n, n, wrist=wrist)
@@ -163,7 +165,7 @@ def test_a_rounded_bus_costs_more_and_nears_the_exact_one(
         assert exact.energy < energies[0] < energies[1] < energies[2]
 
 
-@pytest.mark.parametrize("n", [1, 2, 5, 6, 9, 16])
+@every_build("n", [(1,), (6,), (2,), (5,), (9,), (16,)], few=2)
 def test_torque_adjoint_is_the_transpose_of_the_torque_gradients(core: Any, n: int) -> None:
     """With every axis for itself the gradient is that of the axis powers, sample by sample."""
     if n == 6:
@@ -231,8 +233,8 @@ def directions(core: Any) -> int:
     return 2 if core is None else 8
 
 
-@pytest.mark.parametrize(
-    ("interval", "seed", "regeneration", "smoothing"),
+@every_build(
+    "interval, seed, regeneration, smoothing",
     # every interval and smoothing with two regenerations and every regeneration with both of them
     [
         (interval, seed, REGENERATIONS[(seed + step) % len(REGENERATIONS)], 300.0 * step)
@@ -255,7 +257,7 @@ def test_derivatives_are_those_of_differences(
     check_derivatives(cost, control, interval, rng.integers(0, 2, 9), seed, directions(core))
 
 
-@pytest.mark.parametrize(("n", "wrist"), [(1, False), (3, False), (6, True), (7, False), (7, True)])
+@every_build("n, wrist", [(3, True), (1, False), (3, False), (6, True), (7, False), (7, True)])
 def test_derivatives_of_other_robots_are_those_of_differences(
     core: Any, n: int, wrist: bool
 ) -> None:
@@ -307,7 +309,7 @@ def test_a_tilt_costs_the_square_of_its_excess_over_time(core: Any, seed: int, m
     assert with_tilt - without == pytest.approx(expected, rel=1e-7, abs=1e-6 * abs(without))
 
 
-@pytest.mark.parametrize(("seed", "most"), [(4, 0.0), (5, 0.3), (6, 1.0)])
+@every_build("seed, most", [(4, 0.0), (5, 0.3), (6, 1.0)])
 def test_derivatives_of_a_tilt_are_those_of_differences(core: Any, seed: int, most: float) -> None:
     cost = kr210_cost(core, OPEN, few=True, **tilted(seed, most))
     control = motion(seed, 10, around=WORKING)
@@ -351,6 +353,7 @@ def test_pairs_that_lack_less_than_a_float_can_resolve_count(core: Any, lack: fl
     assert found.value == pytest.approx(2.0 * len(collision.pairs), rel=1e-7)
 
 
+@slow_reference
 def test_a_threshold_row_holds_in_its_interval_only(core: Any) -> None:
     collision, _ = kr210_models(few=True)
     rows = np.stack([np.full(len(collision.pairs), value) for value in (-np.inf, 1.0)])

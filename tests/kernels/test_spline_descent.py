@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builds import every_build, slow_reference
 from geometry_cases import CAPSULES, KR210, box
 from robots import kr210, random_chain
 from spline_cases import (
@@ -40,6 +41,13 @@ from ir_values.arrays import FloatArray
 BLOCK = (box("block", (1.9, 0.35, 1.1), (0.3, 0.3, 2.2)),)  # obstructs `swing`
 
 
+def moving(control: FloatArray, seed: int = 0) -> FloatArray:
+    """q, qd, qdd (2, 3, n) at the ends of a spline that is to begin and end in motion."""
+    size = np.array([0.4, 1.0])[:, None]
+    values = size * np.random.default_rng(seed).uniform(-1.0, 1.0, (2, 2, control.shape[1]))
+    return np.concatenate([control[[0, -1], None], values], axis=1)
+
+
 def descended(
     core: Any, evaluations: int, **options: Any
 ) -> tuple[SplineCost, FloatArray, SplineDescent]:
@@ -48,9 +56,22 @@ def descended(
     return cost, control, cost.descend(control, 0.15, evaluations=evaluations, **options)
 
 
+DESCENTS: tuple[dict[str, Any], ...] = (
+    {"fixed_interval": False},
+    {"fixed_interval": True},
+    {"ends": moving(swing(16))},
+)
+
+
+@pytest.fixture(scope="module")
+def of_reference() -> list[SplineDescent]:
+    """The reference's descents, which every build is compared with."""
+    return [descended(None, 25, **options)[2] for options in DESCENTS]
+
+
 def test_the_descent_lowers_the_cost_and_reports_it_truly(core: Any) -> None:
     last = np.inf
-    for evaluations in (1, 12, 25, 50) if core is None else (1, 12, 25, 50, 200):
+    for evaluations in (1, 12, 25) if core is None else (1, 12, 25, 50, 200):
         cost, control, found = descended(core, evaluations, tolerance=0.0)
         assert found.evaluations <= evaluations
         assert found.value == cost.value(found.control, found.interval).value
@@ -62,7 +83,9 @@ def test_the_descent_lowers_the_cost_and_reports_it_truly(core: Any) -> None:
     assert last < 0.5 * cost.value(control, 0.15).value
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize(
+    "seed", [*range(4), *(pytest.param(seed, marks=pytest.mark.long) for seed in range(4, 8))]
+)
 def test_no_pair_is_left_out_that_was_far_some_evaluations_before(
     compiled_core: Any, seed: int
 ) -> None:
@@ -86,14 +109,7 @@ def test_ends_stay_where_they_are_and_still(core: Any) -> None:
     assert np.abs(along(found.control, found.interval, ends, 2)).max() < 1e-6
 
 
-def moving(control: FloatArray, seed: int = 0) -> FloatArray:
-    """q, qd, qdd (2, 3, n) at the ends of a spline that is to begin and end in motion."""
-    size = np.array([0.4, 1.0])[:, None]
-    values = size * np.random.default_rng(seed).uniform(-1.0, 1.0, (2, 2, control.shape[1]))
-    return np.concatenate([control[[0, -1], None], values], axis=1)
-
-
-@pytest.mark.parametrize("fixed", [False, True])
+@every_build("fixed", [(True,), (False,)])
 def test_ends_in_motion_have_it_whatever_the_interval_becomes(core: Any, fixed: bool) -> None:
     ends = moving(swing(16))
     _, control, found = descended(core, 40, ends=ends, fixed_interval=fixed)
@@ -107,6 +123,7 @@ def test_ends_in_motion_have_it_whatever_the_interval_becomes(core: Any, fixed: 
     assert found.value < 0.7 * start.value
 
 
+@slow_reference
 def test_ends_that_rest_give_the_same_bytes_as_none(core: Any) -> None:
     control = swing(16)
     rest = np.zeros((2, 2, control.shape[1]))
@@ -114,6 +131,7 @@ def test_ends_that_rest_give_the_same_bytes_as_none(core: Any) -> None:
     assert same(descended(core, 30)[2], descended(core, 30, ends=ends)[2])
 
 
+@slow_reference
 def test_a_fixed_interval_stays(core: Any) -> None:
     cost, control, found = descended(core, 40, fixed_interval=True)
     assert found.interval == 0.15
@@ -136,19 +154,18 @@ def test_the_descent_leaves_an_obstacle() -> None:
     assert after > 0.01  # of 20 mm: a penalty, not a proof
 
 
+@slow_reference
 def test_it_ends_when_steps_gain_little(core: Any) -> None:
     patient, hasty = (descended(core, 60, tolerance=t)[2] for t in (0.0, 0.5))
     assert hasty.evaluations < patient.evaluations
     assert hasty.value > patient.value
 
 
-def test_compiled_descent_is_that_of_the_reference(compiled_core: Any) -> None:
-    for options in (
-        {"fixed_interval": False},
-        {"fixed_interval": True},
-        {"ends": moving(swing(16))},
-    ):
-        found, expected = (descended(one, 25, **options)[2] for one in (compiled_core, None))
+def test_compiled_descent_is_that_of_the_reference(
+    compiled_core: Any, of_reference: list[SplineDescent]
+) -> None:
+    for options, expected in zip(DESCENTS, of_reference, strict=True):
+        found = descended(compiled_core, 25, **options)[2]
         assert found.evaluations == expected.evaluations
         assert found.value == pytest.approx(expected.value, rel=1e-9)
         assert found.interval == pytest.approx(expected.interval, rel=1e-8)
@@ -174,6 +191,7 @@ def test_the_same_start_ends_at_the_same_bytes(core: Any) -> None:
     assert same(first, descended(core, most)[2])
 
 
+@slow_reference
 def test_threads_share_one_object(core: Any) -> None:
     cost = kr210_cost(core, BLOCK, few=True)
     starts = [at_rest(motion(seed, 12 + seed, around=swing(12)[0], size=0.3)) for seed in range(4)]

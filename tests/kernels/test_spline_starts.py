@@ -2,6 +2,7 @@
 reference.
 """
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,11 @@ from spline_cases import WORKING, kr210_cost
 
 from ir_kernels import KernelError
 from ir_kernels.limits import polynomial_samples
-from ir_kernels.spline import CubicPath, SplineCost, SplineStarts
+from ir_kernels.spline import CubicPath, ProfileDescent, SplineDescent, SplineStarts
 from ir_values.arrays import FloatArray
 
 STARTS = SplineStarts(spacing=0.1, slower=1.3, fewest=8, most=12)
-EVALUATIONS = 6
+EVALUATIONS = 4
 
 
 def detours(seed: int, count: int) -> list[FloatArray]:
@@ -36,15 +37,21 @@ def passed(count: int = 7) -> tuple[CubicPath, FloatArray]:
     return CubicPath(breaks, np.stack(cubics)), np.linspace(0.0, 1.0, count + 4)[2:-2]
 
 
-def both(compiled_core: Any) -> tuple[SplineCost, SplineCost]:
-    return kr210_cost(compiled_core, few=True), kr210_cost(None, few=True)
+@cache
+def along_paths(core: Any) -> list[SplineDescent]:
+    return kr210_cost(core, few=True).descend_along(detours(1, 3), STARTS, evaluations=EVALUATIONS)
+
+
+@cache
+def along_one(core: Any, fixed: bool) -> ProfileDescent:
+    path, s = passed()
+    return kr210_cost(core, few=True).descend_profile(
+        path, s, 1.5, fixed_duration=fixed, evaluations=EVALUATIONS
+    )
 
 
 def test_descents_along_paths_are_those_of_the_reference(compiled_core: Any) -> None:
-    paths = detours(1, 3)
-    found, expected = (
-        each.descend_along(paths, STARTS, evaluations=EVALUATIONS) for each in both(compiled_core)
-    )
+    found, expected = (along_paths(core) for core in (compiled_core, None))
     for a, b in zip(found, expected, strict=True):
         assert (a.evaluations, len(a.control)) == (b.evaluations, len(b.control))
         assert a.value == pytest.approx(b.value, rel=1e-8)
@@ -72,11 +79,7 @@ def test_a_requested_duration_stays(compiled_core: Any) -> None:
 
 @pytest.mark.parametrize("fixed", [False, True])
 def test_the_profile_along_a_path_is_that_of_the_reference(compiled_core: Any, fixed: bool) -> None:
-    path, s = passed()
-    found, expected = (
-        each.descend_profile(path, s, 1.5, fixed_duration=fixed, evaluations=EVALUATIONS)
-        for each in both(compiled_core)
-    )
+    found, expected = (along_one(core, fixed) for core in (compiled_core, None))
     assert found.evaluations == expected.evaluations
     assert found.value == pytest.approx(expected.value, rel=1e-8)
     assert found.duration == pytest.approx(expected.duration, rel=1e-8)
