@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +25,7 @@ from ir_studies.statistics.findings import findings_of
 from ir_studies.statistics.outputs import columns, page_html, summary_of
 from ir_studies.statistics.runs import NEAREST, maker, pair_of, places_of
 from ir_studies.statistics.settings import EXAMPLE, StatisticsSettings, statistics_settings
-from ir_studies.studies import study_of
+from ir_studies.studies import Study, StudyAnswer, study_of
 
 ASKED = StatisticsSettings("open")
 shares = st.floats(-0.5, 0.5).map(lambda x: round(x, 4))
@@ -212,11 +214,31 @@ def test_pairs_are_drawn_alike_and_keep_their_margin(name: str) -> None:
             assert ((q >= limits.position_min) & (q <= limits.position_max)).all()
 
 
-def test_a_pair_is_planned_driven_and_measured_in_two_ways() -> None:
-    asked = {"cell": "open", "pairs": 1, "plant": "nominal", "planner": ""}
-    row = maker(asked)({"number": 0})
-    again = maker(asked)({"number": 0})
-    assert row == again
+@dataclass(frozen=True)
+class StudyOfAPair:
+    """A study of one pair that was made in a folder: its row, and the progress that was heard."""
+
+    study: Study
+    folder: Path
+    answer: StudyAnswer
+    row: dict[str, Any]
+    heard: list[tuple[str, int, int]]
+
+
+@pytest.fixture(scope="module")
+def study_of_a_pair(tmp_path_factory: pytest.TempPathFactory) -> StudyOfAPair:
+    folder = tmp_path_factory.mktemp("pair")
+    heard: list[tuple[str, int, int]] = []
+    study = study_of("format: ir_statistics/1\ncell: open\npairs: 1\nseed: 3\nplant: nominal\n")
+    means = Means(1, progress=lambda phase, done, of, best: heard.append((phase, done, of)))
+    answer = study.run(folder, means)
+    kept = json.loads((folder / "results.jsonl").read_text().splitlines()[-1])
+    row = {name: value for name, value in kept.items() if name != "key"}
+    return StudyOfAPair(study, folder, answer, row, heard)
+
+
+def test_a_pair_is_planned_driven_and_measured_in_two_ways(study_of_a_pair: StudyOfAPair) -> None:
+    row = study_of_a_pair.row
     for timing in ("synchronous", "asynchronous"):
         one = row[timing]
         assert one["message"] == ""
@@ -225,11 +247,17 @@ def test_a_pair_is_planned_driven_and_measured_in_two_ways() -> None:
         assert math.isfinite(one["peak_w"])
 
 
-def test_a_study_leaves_table_and_page(tmp_path: Path) -> None:
-    heard: list[tuple[str, int, int]] = []
-    study = study_of("format: ir_statistics/1\ncell: open\npairs: 1\nplant: nominal\n")
-    means = Means(1, progress=lambda phase, done, of, best: heard.append((phase, done, of)))
-    answer = study.run(tmp_path, means)
+@pytest.mark.long
+def test_a_pair_is_made_alike_in_any_process(study_of_a_pair: StudyOfAPair) -> None:
+    asked = {"cell": "open", "pairs": 1, "seed": 3, "plant": "nominal"}
+    assert maker(asked)({"number": 0}) == study_of_a_pair.row
+
+
+def test_a_study_leaves_table_and_page(study_of_a_pair: StudyOfAPair, tmp_path: Path) -> None:
+    study = study_of_a_pair.study
+    answer = study_of_a_pair.answer
+    heard = study_of_a_pair.heard
+    shutil.copytree(study_of_a_pair.folder, tmp_path, dirs_exist_ok=True)
     assert [path.name for path in answer.files] == ["table.csv", "index.html"]
     assert len((tmp_path / "table.csv").read_text().splitlines()) == 3
     assert heard[-1][1:] == (1, 1)
