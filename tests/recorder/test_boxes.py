@@ -181,12 +181,12 @@ PAGES: dict[str, Callable[[Analysis], str]] = {
     "statistics": statistics,
     "layout": layout,
 }
-LATER = ("parts", "recordings", "arena", "statistics")  # only in the long tests
+SOONER = ("report", "fleet", "layout")  # the others only in the long tests
 
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=pytest.mark.long) if name in LATER else name for name in PAGES],
+    [name if name in SOONER else pytest.param(name, marks=pytest.mark.long) for name in PAGES],
 )
 def test_nothing_is_cut_overlaps_or_scrolls_and_axe_finds_nothing(
     browser: Any,
@@ -217,7 +217,9 @@ def test_nothing_is_cut_overlaps_or_scrolls_and_axe_finds_nothing(
     assert {size: found for size, found in faults.items() if found} == {}
 
 
-@pytest.mark.parametrize("name", ["report", "before and after"])
+@pytest.mark.parametrize(
+    "name", ["report", pytest.param("before and after", marks=pytest.mark.long)]
+)
 def test_paper_from_a_phone_has_every_section_that_paper_from_a_desk_has(
     browser: Any, analysis: Analysis, tmp_path: Path, name: str
 ) -> None:
@@ -309,7 +311,7 @@ def test_a_time_axis_with_rests_is_in_order_and_can_be_read_back(
 ) -> None:
     """Two of three rests of a cycle are shown short; what moves has most of the axis."""
     path = tmp_path / "page.html"
-    path.write_text(before_and_after(analysis), encoding="utf-8")
+    path.write_text(report(analysis), encoding="utf-8")
     page = browser.open(path, 1400, 900)
     faults, broken, moving = page.run(PLACED)
     page.close()
