@@ -10,7 +10,7 @@ import pytest
 
 from ir_description import cell_from_yaml
 from ir_krl import Followed, KrlMotionError, parse
-from ir_planner import Planner
+from ir_planner import Planner, ProgramPlan
 from ir_planner.errors import RequestError
 from ir_planner.krl import evaluate_krl, export_krl, follow_krl
 
@@ -21,6 +21,14 @@ HOME = "{A1 0,A2 -90,A3 90,A4 0,A5 0,A6 0,E1 0}"
 @pytest.fixture(scope="module")
 def railed() -> Planner:
     return Planner(cell_from_yaml(EXAMPLE.read_text()), clock=lambda: 0.0)
+
+
+@pytest.fixture(scope="module")
+def plan(railed: Planner) -> ProgramPlan:
+    """From where the robot is parked into the press, which is farther along the rail."""
+    found = railed.plan_program(stations=("press_place",), start=railed.cell.posture("park"))
+    assert found.status.ok, found.status
+    return found
 
 
 def program(railed: Planner, *lines: str) -> Followed:
@@ -35,9 +43,9 @@ def last(railed: Planner, *lines: str) -> np.ndarray:
     return np.asarray(moved[-1].step.trajectory.positions[-1])
 
 
-def test_an_exported_program_comes_back_with_its_joules(railed: Planner) -> None:
-    plan = railed.plan_program()
-    assert plan.status.ok, plan.status
+def test_an_exported_program_comes_back_with_its_joules(
+    railed: Planner, plan: ProgramPlan
+) -> None:
     export = export_krl(railed, plan.movements, "along")
     assert export.exported.certified
     assert export.exported.energy == pytest.approx(export.planned.energy, rel=0.02)
@@ -93,8 +101,7 @@ def test_what_the_rail_can_not_do_is_refused(
 
 
 @pytest.mark.parametrize("style", ["kss8", "krc2", "urscript"])
-def test_styles_without_e1_are_refused(railed: Planner, style: str) -> None:
-    plan = railed.plan_program()
+def test_styles_without_e1_are_refused(railed: Planner, plan: ProgramPlan, style: str) -> None:
     with pytest.raises(RequestError, match="style spline"):
         export_krl(railed, plan.movements, "along", style=style)
 
