@@ -48,7 +48,7 @@ def along(q0: FloatArray, q1: FloatArray, begin: float, end: float) -> FloatArra
 @pytest.mark.parametrize("bodies", SCENES)
 def test_dense_samples_contradict_no_verdict(bodies: tuple[Body, ...]) -> None:
     model = kr210(bodies)
-    q0, q1 = edges(np.random.default_rng(2), 150)
+    q0, q1 = edges(np.random.default_rng(2), 50)
     found = model.certify_edges(q0, q1, SAFETY)
     for k, verdict in enumerate(found.verdict):
         if found.t0[k] > 0.0:
@@ -82,7 +82,7 @@ def test_compiled_verdicts_are_those_of_the_reference(bodies: tuple[Body, ...]) 
     if compiled.MODULE is None:
         pytest.skip("nothing compiled to compare with")
     model = kr210(bodies)
-    q0, q1 = edges(np.random.default_rng(4), 25)
+    q0, q1 = edges(np.random.default_rng(4), 12)
     ours = model.certify_edges(q0, q1, SAFETY)
     verdict, t0, t1, _ = Model(model._geometry).certify_edges(
         q0, q1, np.full(len(model.pairs), SAFETY)

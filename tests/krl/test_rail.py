@@ -43,9 +43,7 @@ def last(railed: Planner, *lines: str) -> np.ndarray:
     return np.asarray(moved[-1].step.trajectory.positions[-1])
 
 
-def test_an_exported_program_comes_back_with_its_joules(
-    railed: Planner, plan: ProgramPlan
-) -> None:
+def test_an_exported_program_comes_back_with_its_joules(railed: Planner, plan: ProgramPlan) -> None:
     export = export_krl(railed, plan.movements, "along")
     assert export.exported.certified
     assert export.exported.energy == pytest.approx(export.planned.energy, rel=0.02)

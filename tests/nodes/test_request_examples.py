@@ -26,7 +26,7 @@ from ir_sim_driver.node import SimDriver
 
 SRV_FOLDER = Path(__file__).parents[2] / "ros_ws" / "src" / "ir_msgs" / "srv"
 LINE = re.compile(r'# ros2 service call (\S+) (\S+) "(.*)"')
-PROGRAM = "PlanProgram"  # with its savings it takes as long as all others together
+LONG = ("PlanProgram", "PlanRobots")  # they take as long as all others together
 UNKNOWN = "0123456789abcdef"  # the id that examples give
 LATER: set[str] = set()  # defined before a node offers it
 DRIVER = {
@@ -114,7 +114,7 @@ def test_the_examples_are_answered_as_they_should(
     def offered() -> set[str]:
         return {service for service, _ in ros_node.get_service_names_and_types()}
 
-    asked = {name: wanted for name, wanted in EXPECTED.items() if name != PROGRAM}
+    asked = {name: wanted for name, wanted in EXPECTED.items() if name not in LONG}
     now = {name: example(name)[0] for name in asked}
     wait_for(lambda: set(now.values()) <= offered(), what="the services are offered")
     wrong = []
@@ -136,10 +136,15 @@ def test_the_examples_are_answered_as_they_should(
 
 
 @pytest.mark.long
-def test_the_example_of_a_program_is_answered_as_it_should(call: Any) -> None:
-    service, type_text, text = example(PROGRAM)
-    assert (service, text) == ("/ir_planner/plan_program", "{}")
-    status = call(interface_type(type_text, "srv"), "plan_program", timeout=PATIENCE).status
-    code, word = EXPECTED[PROGRAM]
+@pytest.mark.parametrize("name", LONG)
+def test_the_example_of_a_long_plan_is_answered_as_it_should(call: Any, name: str) -> None:
+    service, type_text, text = example(name)
+    kind = interface_type(type_text, "srv")
+    node, _, own = service.rpartition("/")
+    assert node == "/ir_planner"
+    request = message_from_yaml(kind.Request, text)
+    fields = {field: getattr(request, field) for field in request.get_fields_and_field_types()}
+    status = call(kind, own, timeout=PATIENCE, **fields).status
+    code, word = EXPECTED[name]
     assert status.code == code
     assert word in status.message

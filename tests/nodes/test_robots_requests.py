@@ -9,16 +9,17 @@ from typing import Any
 
 import pytest
 
-from ir_description import load_robot_cells
+from ir_description import RobotCells
 from ir_msgs.srv import PlanRobots
 from ir_msgs_py.ros.plan_conversions import planned_movement_from_msg
 from ir_msgs_py.status import StatusCode
 from ir_planner.node.inputs import LastState
 from ir_planner.node.requests import Requests
 from ir_planner.planner import Planner
-from ir_planner.robots import plan_robots
+from ir_planner.robots import RobotsPlan, plan_robots
 
 CYCLE_TIME = 12.0  # s
+WORK = 300  # iterations: what is chosen doesn't matter here
 
 
 @pytest.fixture(scope="module")
@@ -34,19 +35,36 @@ def requests() -> Requests:
 
 def asked(requests: Requests, cancelled: bool = False, **fields: Any) -> PlanRobots.Response:
     handler = requests.guarded(requests.plan_robots)
-    return handler(PlanRobots.Request(**fields), PlanRobots.Response(), lambda: cancelled)
+    request = PlanRobots.Request(**fields)
+    request.options.max_iterations = WORK
+    return handler(request, PlanRobots.Response(), lambda: cancelled)
 
 
-def test_the_answer_is_the_library_s_plan_and_is_kept(requests: Requests) -> None:
+def test_the_answer_is_the_library_s_plan_and_is_kept(
+    requests: Requests, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plans: list[RobotsPlan] = []
+    calls: list[dict[str, Any]] = []
+
+    def planned(cells: RobotCells, **choices: Any) -> RobotsPlan:
+        assert cells.name == "two_robots"
+        calls.append(choices)
+        plans.append(plan_robots(cells, **choices))
+        return plans[-1]
+
+    monkeypatch.setattr("ir_planner.node.requests.plan_robots", planned)
     request = PlanRobots.Request(cell_file="two_robots", cycle_time=CYCLE_TIME)
     request.options.include_points = True
+    request.options.max_iterations = WORK
     cell = requests.planner.cell
     handler = requests.guarded(requests.plan_robots)
     answer = handler(request, PlanRobots.Response())
     assert answer.status.code == StatusCode.SUCCESS, answer.status.message
-    cells = load_robot_cells("two_robots")
-    assert cells is not None
-    plan = plan_robots(cells, cycle_time=CYCLE_TIME, clock=lambda: 0.0)
+    (plan,) = plans
+    assert calls[0]["cycle_time"] == CYCLE_TIME
+    assert calls[0]["peak_power"] == 0.0
+    assert calls[0]["options"].max_iterations == WORK
+    assert calls[0]["settings"] is requests.planner.settings
     assert [each.robot for each in answer.robots] == list(plan.robots)
     assert requests.planner.cell is cell
     for k, (own, program) in enumerate(zip(answer.robots, plan.programs, strict=True)):
@@ -80,7 +98,11 @@ def test_the_answer_is_the_library_s_plan_and_is_kept(requests: Requests) -> Non
         ({"cell_file": "two_robots", "cycle_time": math.nan}, "cycle_time is nan"),
         ({"cell_file": "two_robots", "cycle_time": 1.0}, "the shortest of all robots together"),
         ({"cell_file": "two_robots", "peak_power": -1.0}, "peak_power is -1 W"),
-        ({"cell_file": "two_robots", "peak_power": 1.0}, "needs more than its share of the peak"),
+        pytest.param(
+            {"cell_file": "two_robots", "peak_power": 1.0},
+            "needs more than its share of the peak",
+            marks=pytest.mark.long,
+        ),
     ],
 )
 def test_what_makes_no_sense_is_refused(

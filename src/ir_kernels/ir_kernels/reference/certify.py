@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ir_kernels.geometry import COLLIDES, FREE, UNDECIDED, Geometry
 from ir_kernels.reference import chain, collision
+from ir_kernels.reference.segments import cross
 from ir_values.arrays import FloatArray, IntArray
 
 MARGIN = 1e-9  # [m] more than double precision loses on lengths of some ten metres
@@ -145,7 +146,7 @@ def capsule_bounds(
         moved = np.zeros(len(segments))
         for j in range(link - 1, -1, -1):
             arm = segments[:, c] - origin[:, None, j]
-            reach = np.linalg.norm(np.cross(arm, direction[:, None, j]), axis=-1).max(axis=1)
+            reach = np.linalg.norm(cross(arm, direction[:, None, j]), axis=-1).max(axis=1)
             slides = first_slides and j == 0
             moved = moved + spread[:, j] * (1.0 if slides else reach + moved)
             bound[:, c, j] = moved
