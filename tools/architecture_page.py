@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import re
 import sys
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -30,10 +31,16 @@ def rooms(package: str) -> dict[str, list[Path]]:
     return found
 
 
+@cache
+def parsed(path: Path) -> ast.Module:
+    """The syntax of a file, read once."""
+    return ast.parse(path.read_text("utf-8"))
+
+
 def first_words(files: list[Path]) -> str:
     """First paragraph of a room: of its `__init__`, or of the module that it is."""
     face = next((path for path in files if path.name == "__init__.py"), files[0])
-    text = ast.get_docstring(ast.parse(face.read_text("utf-8"))) or ""
+    text = ast.get_docstring(parsed(face)) or ""
     return " ".join(text.split("\n\n")[0].split())
 
 
@@ -43,7 +50,7 @@ def arrows(package: str) -> Arrows:
     for room, files in rooms(package).items():
         names: set[str] = set()
         for path in files:
-            for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            for node in ast.walk(parsed(path)):
                 if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
                     names.add(node.module)
                 elif isinstance(node, ast.Import):
@@ -72,6 +79,7 @@ def floors(known: Arrows) -> list[list[str]]:
 def direct(known: Arrows) -> Arrows:
     """The arrows that no longer path of arrows replaces."""
 
+    @cache
     def reached(room: str) -> set[str]:
         return known[room] | {far for near in known[room] for far in reached(near)}
 

@@ -51,7 +51,7 @@ def test_a_trajectory_that_collides_is_refused_with_pair_and_time():
     assert not simulation.executor.active
 
 
-@pytest.mark.parametrize("seconds", [4.0, 20.0])
+@pytest.mark.parametrize("seconds", [4.0, pytest.param(20.0, marks=pytest.mark.long)])
 def test_a_contact_stops_the_robot_and_ends_the_goal(simulation, run_out, seconds):
     started(simulation, HOME, INTO_THE_PALLET, seconds=seconds, allow_collision=True)
     outcome = run_out(simulation)

@@ -28,17 +28,18 @@ LONGEST_PAUSE = 2.0  # s: the rest is stepped for nothing
 
 @dataclass(frozen=True)
 class Drawn:
-    """A program of a cell, drawn by seed: -1 is the cell's own, with short pauses on motors."""
+    """A program of a cell, drawn by seed: -1 is the cell's own, with short pauses on motors, -2
+    what of it takes a part and leaves it.
+    """
 
     cell: str
     seed: int
 
 
-FEW = (
+FEW = (Drawn("demo", -2),)
+MORE = (
     Drawn("demo", -1),
     Drawn("cnc_door", 1),
-)
-MORE = (
     Drawn("table_columns", 0),
     Drawn("demo", 0),
     Drawn("open", 0),
@@ -52,17 +53,19 @@ def cell_of(drawn: Drawn) -> Cell:
     """The cell with the program that is drawn: stations and postures, with dwells of up to 2 s."""
     cell = load_cell(drawn.cell)
     if drawn.seed < 0:
-        return replace(cell, program=tuple(_shortened(step) for step in cell.program))
+        steps = tuple(_shortened(step) for step in cell.program)
+        handling = tuple(step for step in steps if step.attach or step.detach)
+        return replace(cell, program=steps if drawn.seed == -1 else handling)
     rng = np.random.default_rng([drawn.seed, *drawn.cell.encode()])
     names = [*(station.name for station in cell.stations), "park"]
-    steps: list[ProgramStep] = []
-    while len(steps) < 5:
+    chosen: list[ProgramStep] = []
+    while len(chosen) < 5:
         name = str(rng.choice(names))
-        if not steps or steps[-1].target != name:
+        if not chosen or chosen[-1].target != name:
             kind = "POSTURE" if name == "park" else "STATION"
             dwell = float(np.round(rng.choice([0.0, 0.2, rng.uniform(0.5, LONGEST_PAUSE)]), 2))
-            steps.append(ProgramStep(kind, name, dwell))
-    return replace(cell, program=tuple(steps))
+            chosen.append(ProgramStep(kind, name, dwell))
+    return replace(cell, program=tuple(chosen))
 
 
 def _shortened(step: ProgramStep) -> ProgramStep:

@@ -124,7 +124,7 @@ def with_pauses(cell: Cell, pauses: tuple[tuple[float, str], ...]) -> Cell:
     return replace(cell, program=tuple(steps))
 
 
-SHORT = (1, 7, 10, 11)  # a machine, and the pauses before and after a posture
+SHORT = (0, 7, 11, 10)  # two postures, and a pause at each
 WHOLE = range(13)
 
 
@@ -136,7 +136,7 @@ WHOLE = range(13)
         *(
             pytest.param(
                 steps,
-                ((22.0, "BUS_POWER_OFF"), (120.0, "AUTO")),
+                ((22.0, "BUS_POWER_OFF"), (90.0 if steps is SHORT else 120.0, "AUTO")),
                 ("STAND_ON_BRAKES", "STAND_ON_BRAKES>BUS_POWER_OFF"),
                 marks=[] if steps is SHORT else [pytest.mark.long],
             )

@@ -155,7 +155,7 @@ def test_a_speed_scaling_that_means_nothing_is_ignored_with_a_warning(make, fact
     assert "speed scaling" in simulation.notices.last.sentence
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(at=st.floats(0.0, 2.0), backend=st.sampled_from(["ideal", "pybullet"]))
 def test_a_cancel_at_any_instant_stops_on_the_path_within_the_limits(
     make, plan, start, cell, at, backend
@@ -192,7 +192,7 @@ def test_stopping_twice_and_after_the_end_is_harmless(make, plan, start, run_out
     assert not simulation.cancel(12345)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(at=st.floats(0.05, 1.9), lead=st.floats(1.5, 3.0))
 def test_a_replacement_never_jumps(make, plan, start, cell, at, lead):
     home = np.array(cell.machine_home)

@@ -103,7 +103,7 @@ def act(simulation, what, value, plan, start):  # noqa: C901
 sequences = st.lists(st.tuples(actions, st.integers(1, 120)), min_size=5, max_size=30)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None, derandomize=True)
 @given(sequence=sequences)
 def test_no_sequence_breaks_the_controller(make, plan, start, sequence):
     keep_the_laws(make, plan, start, sequence)
@@ -162,7 +162,7 @@ def keep_the_laws(make, plan, start, sequence):
 short_sequences = st.lists(st.tuples(actions, st.integers(1, 60)), max_size=8)
 
 
-@settings(max_examples=50, deadline=None, derandomize=True)
+@settings(max_examples=20, deadline=None, derandomize=True)
 @given(sequence=short_sequences)
 def test_the_time_to_operate_of_an_ended_pause_is_kept_from_every_state(
     make, plan, start, sequence
@@ -194,15 +194,19 @@ def test_the_time_to_operate_of_an_ended_pause_is_kept_from_every_state(
 
 
 @pytest.mark.parametrize(
-    "seed", [7, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(8, 12))]
+    ("seed", "steps"),
+    [
+        (7, 30_000),
+        *(pytest.param(seed, 100_000, marks=pytest.mark.long) for seed in range(7, 12)),
+    ],
 )
-def test_a_hundred_thousand_steps_of_random_bits(make, seed):
+def test_steps_of_random_bits_make_legal_changes_alone(make, seed, steps):
     """Bits that a broken PLC might send, 1000 a second."""
     simulation = make(transitions=QUICK, idle=IDLE, load="none")
     generator = np.random.default_rng(seed)
     seen = set()
     before = simulation.modes.mode
-    for k in range(100_000):
+    for k in range(steps):
         if k % 17 == 0:
             simulation.plc.set_bit(BITS[generator.integers(len(BITS))], bool(generator.integers(2)))
         if k % 1000 == 0:

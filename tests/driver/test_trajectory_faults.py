@@ -184,7 +184,7 @@ def test_no_goal_in_manual_mode_without_the_enabling_switch(make, start, plan, h
 
 def test_with_the_enabling_switch_t1_creeps(make, start, run_out, plan, home):
     simulation = make(controller=ControllerSettings(operating_mode="T1", enabling_switch=True))
-    start(simulation, plan(1.2, home, home + np.array([0.4, 0.0, 0.0, 0.0, 0.0, 0.0])))
+    start(simulation, plan(0.6, home, home + np.array([0.2, 0.0, 0.0, 0.0, 0.0, 0.0])))
     fastest = 0.0
     before = simulation.tool.position(simulation.backend.q)
     while not simulation.take_outcomes():

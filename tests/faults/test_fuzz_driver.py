@@ -322,8 +322,8 @@ def attacked(
     return done, wrong
 
 
-def test_three_hundred_hostile_requests_break_no_law() -> None:
-    done, wrong = attacked(300, seed=1)
+def test_a_hundred_hostile_requests_break_no_law() -> None:
+    done, wrong = attacked(100, seed=1)
     assert wrong == []
     assert {act.__name__ for act in ACTS} == {name.removesuffix(" refused") for name in done}
     assert (
@@ -337,8 +337,8 @@ def test_twenty_thousand_hostile_requests_break_no_law(seed: int) -> None:
     assert attacked(1_000, seed=100 + seed)[1] == []
 
 
-def test_sixty_hostile_requests_to_the_physics_break_no_law() -> None:
-    assert attacked(60, seed=2, backend="pybullet")[1] == []
+def test_thirty_hostile_requests_to_the_physics_break_no_law() -> None:
+    assert attacked(30, seed=2, backend="pybullet")[1] == []
 
 
 def test_hostile_requests_among_machines_break_no_law() -> None:

@@ -192,7 +192,7 @@ def test_a_name_that_does_not_exist_is_noticed() -> None:
         "interface_reference",
         "mistakes_page",
         "parameter_reference",
-        "readme_figures",
+        pytest.param("readme_figures", marks=pytest.mark.long),
     ],
 )
 def test_a_page_that_is_written_from_code_is_as_the_code_is(name: str) -> None:
