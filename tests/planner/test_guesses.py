@@ -47,7 +47,9 @@ def test_joints_beyond_the_fifth_stay_where_the_straight_segment_has_them() -> N
         assert set(np.round(path[1:-1, 5], 9)) <= {0.1, 0.2, 0.3}
 
 
-@pytest.mark.parametrize("cell", ["table_columns", "deep_box"])
+@pytest.mark.parametrize(
+    "cell", ["table_columns", pytest.param("deep_box", marks=pytest.mark.long)]
+)
 def test_the_seed_makes_little_difference(cell: str, scene_of: SceneOf) -> None:
     scene = scene_of(cell)
     for task in scene.cell.tasks[:3]:

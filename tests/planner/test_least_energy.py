@@ -108,8 +108,8 @@ def test_short_movements_cost_little_more_than_the_best_known(
         ("open", 2),
         ("demo", 2),
         ("deep_box", 3),
-        ("table_columns", 1),
-        pytest.param("table_columns", 6, marks=DEARER),
+        pytest.param("table_columns", 1, marks=pytest.mark.long),
+        pytest.param("table_columns", 6, marks=[DEARER, pytest.mark.long]),
     ],
 )
 def test_no_answer_costs_more_than_a_shorter_one_stretched(
@@ -127,7 +127,15 @@ def test_no_answer_costs_more_than_a_shorter_one_stretched(
         assert longer.report.energy <= energy * (1.0 + 1e-6)
 
 
-@pytest.mark.parametrize(("cell", "seed"), [("open", 1), ("deep_box", 2), ("open", 4), ("demo", 6)])
+@pytest.mark.parametrize(
+    ("cell", "seed"),
+    [
+        pytest.param("open", 1, marks=pytest.mark.long),
+        ("deep_box", 2),
+        ("open", 4),
+        ("demo", 6),
+    ],
+)
 def test_no_duration_takes_less_than_the_least_energy(
     cell: str, seed: int, scene_of: SceneOf
 ) -> None:
@@ -152,7 +160,7 @@ def test_a_longer_cycle_with_the_wait_at_its_end_is_filled_with_the_least_energy
 
 
 @pytest.mark.parametrize("cell", ["open", "demo"])
-@pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.long)])
 def test_time_is_the_fastest_that_any_objective_finds(
     cell: str, seed: int, scene_of: SceneOf
 ) -> None:
@@ -165,7 +173,13 @@ def test_time_is_the_fastest_that_any_objective_finds(
 
 @pytest.mark.parametrize(
     ("cell", "seed"),
-    [("cnc_door", 1), ("table_columns", 6), ("deep_box", 3), ("demo", 2), ("open", 5)],
+    [
+        ("cnc_door", 1),
+        pytest.param("table_columns", 6, marks=pytest.mark.long),
+        ("deep_box", 3),
+        pytest.param("demo", 2, marks=pytest.mark.long),
+        ("open", 5),
+    ],
 )
 def test_no_price_of_time_is_faster_than_time(cell: str, seed: int, scene_of: SceneOf) -> None:
     """Time alone ended in other local minima: up to 9.8 % were missed."""

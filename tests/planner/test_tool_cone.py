@@ -92,7 +92,7 @@ def cost(plan: MovementPlan, planner: Planner) -> float:
 
 
 @pytest.mark.parametrize("cell", CELLS)
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.long), 1])
 def test_the_tool_leans_no_farther_than_asked(cell: str, seed: int) -> None:
     planner = planner_in(cell)
     judge = Judge(planner)
@@ -118,8 +118,24 @@ def test_the_tool_leans_no_farther_than_asked(cell: str, seed: int) -> None:
         before = min(before, cost(plan, planner))
 
 
-@pytest.mark.parametrize("objective", ["time", "energy", "movement_cost", "time_and_energy"])
-@pytest.mark.parametrize("timing", ["synchronous", "asynchronous"])
+@pytest.mark.parametrize(
+    ("objective", "timing"),
+    [
+        ("time", "asynchronous"),
+        ("time_and_energy", "synchronous"),
+        *(
+            pytest.param(objective, timing, marks=pytest.mark.long)
+            for objective, timing in (
+                ("time", "synchronous"),
+                ("energy", "synchronous"),
+                ("energy", "asynchronous"),
+                ("movement_cost", "synchronous"),
+                ("movement_cost", "asynchronous"),
+                ("time_and_energy", "asynchronous"),
+            )
+        ),
+    ],
+)
 def test_every_objective_and_timing_keeps_it(objective: str, timing: str) -> None:
     planner = planner_in("kr6_bench")
     judge = Judge(planner)
@@ -214,8 +230,17 @@ def test_a_tilt_between_the_points_of_a_trajectory_is_found() -> None:
     assert Judge(planner).largest(given, axis, UP) <= wide.report.largest_tilt <= 0.8
 
 
-@pytest.mark.parametrize("cell", ["cnc_door", "deep_box", "kr6_bench"])
-@pytest.mark.parametrize("direction", ["exit", "entry"])
+@pytest.mark.parametrize(
+    ("cell", "direction"),
+    [
+        ("cnc_door", "exit"),
+        pytest.param("cnc_door", "entry", marks=pytest.mark.long),
+        pytest.param("deep_box", "exit", marks=pytest.mark.long),
+        pytest.param("deep_box", "entry", marks=pytest.mark.long),
+        ("kr6_bench", "exit"),
+        ("kr6_bench", "entry"),
+    ],
+)
 def test_the_tool_leans_no_farther_out_of_a_machine_and_into_it(cell: str, direction: str) -> None:
     """Wherever a service movement is found without a bound, for any of three drawn ones."""
     planner = planner_in(cell)
