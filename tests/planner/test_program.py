@@ -149,12 +149,12 @@ def test_reports_say_the_safety_distance_that_was_planned_with(demo: ProgramPlan
     assert moving == {demo.report.safety_distance} == {PlanOptions().safety_distance}
 
 
-def test_the_same_program_has_the_same_id(
-    demo: ProgramPlan, demo_cell: Cell, power: PowerData
-) -> None:
-    again = planned(load_cell("demo"), power)
-    assert again.program_id == demo.program_id
-    assert planned(demo_cell, power, velocity_scaling=0.5).program_id != demo.program_id
+def test_the_same_program_has_the_same_id(demo_cell: Cell, power: PowerData) -> None:
+    stations = ("infeed_pick", "home")
+    once = planned(demo_cell, power, *stations)
+    assert planned(load_cell("demo"), power, *stations).program_id == once.program_id
+    slower = planned(demo_cell, power, *stations, velocity_scaling=0.5)
+    assert slower.program_id != once.program_id
 
 
 def test_a_program_takes_no_duration_of_a_movement(demo_cell: Cell, power: PowerData) -> None:
@@ -195,7 +195,9 @@ def test_an_unknown_station_lists_the_known(demo_cell: Cell, power: PowerData) -
 
 def test_progress_is_reported_and_a_cancel_stops(demo_cell: Cell, power: PowerData) -> None:
     heard: list[str] = []
-    request = ProgramRequest(demo_cell, power, (), np.array(demo_cell.machine_home), PlanOptions())
+    stations = ("infeed_pick", "home")
+    home = np.array(demo_cell.machine_home)
+    request = ProgramRequest(demo_cell, power, stations, home, PlanOptions())
     budget = Work(100_000, 1.0, lambda: 0.0, lambda: "movements" in heard)
     with pytest.raises(CancelledError):
         plan_program(request, budget, lambda phase, done, total, cost: heard.append(phase))
@@ -207,9 +209,9 @@ def test_automatic_pauses_take_the_cheapest_mode(power: PowerData) -> None:
 
     text = cell_to_yaml(load_cell("demo"))
     assert "power_mode: BUS_POWER_OFF" in text
-    plan = planned(
-        cell_from_yaml(text.replace("power_mode: BUS_POWER_OFF", "power_mode: AUTO")), power
-    )
+    cell = cell_from_yaml(text.replace("power_mode: BUS_POWER_OFF", "power_mode: AUTO"))
+    pauses = tuple(step for step in cell.program if step.kind == "PAUSE")
+    plan = planned(replace(cell, program=pauses), power)
     chosen = [movement.power_mode for movement in plan.movements if movement.duration == 180.0]
     assert chosen == ["STAND_ON_BRAKES>BUS_POWER_OFF"]
 

@@ -198,7 +198,7 @@ def test_a_service_movement_begins_at_the_station_and_leaves_it(
 
 
 def test_a_program_along_the_rail_is_certified(planner: Planner) -> None:
-    plan = planner.plan_program()
+    plan = planner.plan_program(max_iterations=3_000)
     assert plan.status.ok, plan.status
     assert plan.report.certified
 

@@ -74,7 +74,7 @@ def drive_joules(scene: PlanningScene, ends: FloatArray, duration: float) -> flo
 
 
 @settings(
-    max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=4, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(cell=CELLS, seed=st.integers(0, 10_000), factor=st.floats(1.3, 4.0))
 def test_no_answer_costs_more_than_an_s_curve_at_its_duration(
@@ -94,7 +94,7 @@ def test_no_answer_costs_more_than_an_s_curve_at_its_duration(
 
 
 @settings(
-    max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=3, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(cell=CELLS, seed=st.integers(0, 10_000))
 def test_every_duration_from_the_fastest_on_is_met(cell: str, seed: int, scene_of: SceneOf) -> None:
@@ -120,7 +120,7 @@ def test_a_movement_to_where_it_starts_takes_the_requested_duration(
 
 
 @settings(
-    max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=3, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(cell=CELLS, seed=st.integers(0, 10_000), planner_id=st.sampled_from(["", "direct"]))
 def test_asynchronous_joints_never_take_longer_and_the_answer_names_its_timing(
@@ -145,7 +145,9 @@ def test_asynchronous_joints_never_take_longer_and_the_answer_names_its_timing(
 
 
 @pytest.mark.parametrize("cell", ["open", "table_columns", "deep_box"])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 4))]
+)
 def test_movement_cost_is_no_more_than_that_of_the_answer_for_energy(cell: str, seed: int) -> None:
     planner = Planner(cell, clock=lambda: 0.0)
     robot = planner.cell.robot
