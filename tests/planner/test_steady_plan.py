@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tending import LITTLE, steady
 
 from ir_description import (
     Cell,
@@ -41,42 +42,57 @@ def planned(parts_per_hour: float, lathe: float = 95.0) -> SteadyPlan:
         replace(machine, process=lathe) if machine.name == "lathe" else machine
         for machine in CELL.equipment
     )
-    planner = Planner(replace(CELL, equipment=machines), clock=lambda: 0.0)
-    return planner.plan_steady_cycle(parts_per_hour=parts_per_hour)
+    return steady(replace(CELL, equipment=machines), parts_per_hour=parts_per_hour)
 
 
 @cache
 def at_thirty() -> SteadyPlan:
     """The plan that most tests look at, with its saving and two cycles of a run."""
-    planner = Planner(CELL, clock=lambda: 0.0)
-    return planner.plan_steady_cycle(parts_per_hour=30.0, saving=True, cycles=2)
+    return steady(CELL, parts_per_hour=30.0, saving=True, cycles=2)
 
 
 @cache
-def roomy_at(parts_per_hour: float) -> SteadyPlan:
-    """With a lathe that works on two parts at once."""
+def lathe_line(visits: tuple[str, ...], capacity: int, parts_per_hour: float) -> SteadyPlan:
+    """With a lathe that works on so many parts at once."""
+    cell = routed(CELL, visits)
     machines = tuple(
-        replace(machine, capacity=2) if machine.name == "lathe" else machine
-        for machine in CELL.equipment
+        replace(machine, capacity=capacity) if machine.name == "lathe" else machine
+        for machine in cell.equipment
     )
-    planner = Planner(replace(CELL, equipment=machines), clock=lambda: 0.0)
-    return planner.plan_steady_cycle(parts_per_hour=parts_per_hour, saving=True, cycles=2)
+    cell = replace(cell, equipment=machines)
+    return steady(cell, parts_per_hour=parts_per_hour, saving=True, cycles=2)
 
 
-def test_a_lathe_for_two_parts_is_twice_as_soon_and_no_dearer() -> None:
-    plan = roomy_at(45.0)
+LATHE = ("infeed_pick", "lathe_chuck", "outfeed_place")
+WHOLE = ("infeed_pick", "lathe_chuck", "washer_basket", "gauge_seat", "outfeed_place")
+LINES = [LATHE, pytest.param(WHOLE, marks=pytest.mark.long)]
+
+
+def tended(visits: tuple[str, ...]) -> list[str]:
+    """The machines of a line whose lathe has two places, by the names of their slots."""
+    others = [CELL.station(name).equipment for name in visits[2:-1]]
+    return ["lathe.1", "lathe.2", *others]
+
+
+@pytest.mark.parametrize("visits", LINES)
+def test_a_lathe_for_two_parts_is_twice_as_soon_and_no_dearer(visits: tuple[str, ...]) -> None:
+    plan = lathe_line(visits, 2, 45.0)
+    for_one = lathe_line(visits, 1, 30.0)
     assert plan.cycle is not None
-    assert plan.cycle.seconds_per_part <= 80.0 + ROUNDING < at_thirty().fastest
-    assert plan.joules < at_thirty().joules
+    assert plan.cycle.seconds_per_part <= 80.0 + ROUNDING < for_one.fastest
+    assert plan.joules < for_one.joules
     assert plan.gap < 1.0
-    assert plan.cycle.most == (2, 1, 1)
+    assert plan.cycle.most == (2, *(1 for _ in visits[2:-1]))
 
 
-def test_bars_of_a_machine_are_its_work_and_no_more_parts_than_it_works_on() -> None:
-    plan = roomy_at(45.0)
+@pytest.mark.parametrize("visits", LINES)
+def test_bars_of_a_machine_are_its_work_and_no_more_parts_than_it_works_on(
+    visits: tuple[str, ...],
+) -> None:
+    plan = lathe_line(visits, 2, 45.0)
     assert plan.cycle is not None
     bars = machine_bars(plan)
-    assert set(bars) == {"lathe.1", "lathe.2", "washer", "gauge"}
+    assert list(bars) == tended(visits)
     for name, own in bars.items():
         machine = name.partition(".")[0]
         parts = 1 if machine == "lathe" else 2
@@ -86,9 +102,28 @@ def test_bars_of_a_machine_are_its_work_and_no_more_parts_than_it_works_on() -> 
             assert sum(begin < moment < begin + length for begin, length in own) <= 1
 
 
+@pytest.mark.long
+def test_movements_depend_neither_on_how_long_machines_work_nor_on_what_they_hold() -> None:
+    """What the tests of this folder share."""
+    cell = routed(CELL, ("infeed_pick", "gauge_seat", "outfeed_place"))
+    machines = tuple(
+        replace(machine, process=33.0, capacity=2, buffer=1) if machine.process else machine
+        for machine in cell.equipment
+    )
+    steady(cell)
+    shared = steady(replace(cell, equipment=machines), cycles=2)
+    own = Planner(replace(cell, equipment=machines), clock=lambda: 0.0)
+    alone = own.plan_steady_cycle(cycles=2, max_iterations=LITTLE)
+    for one, other in ((shared.program, alone.program), (shared.run, alone.run)):
+        assert one is not None
+        assert other is not None
+        assert one.program_id == other.program_id
+
+
 @pytest.fixture
 def searching(monkeypatch: pytest.MonkeyPatch) -> Event:
-    """Set when the search for a cycle begins."""
+    """Set when the search for a cycle begins, of movements that are known."""
+    at_thirty()
     begun = Event()
 
     def fastest(*what: Any, **named: Any) -> Any:
@@ -101,20 +136,22 @@ def searching(monkeypatch: pytest.MonkeyPatch) -> Event:
 
 def test_the_search_for_a_cycle_ends_on_request(searching: Event) -> None:
     with pytest.raises(CancelledError):
-        Planner(CELL).plan_steady_cycle(parts_per_hour=30.0, cancelled=searching.is_set)
+        steady(CELL, parts_per_hour=30.0, cancelled=searching.is_set)
 
 
 def test_two_parts_a_cycle_are_searched_for_until_the_time_is_up(searching: Event) -> None:
-    planner = Planner(CELL, clock=lambda: 1e6 * searching.is_set())
-    plan = planner.plan_steady_cycle(parts_per_hour=30.0, units=2)
+    plan = steady(CELL, clock=lambda: 1e6 * searching.is_set(), parts_per_hour=30.0, units=2)
     assert plan.info.truncated
     assert plan.cycle is not None
     assert plan.cycle.units == 1
     assert plan.joules == pytest.approx(at_thirty().joules, rel=SETTLED)
 
 
-def test_a_lathe_for_two_parts_has_a_program_that_is_certified_and_read_back() -> None:
-    plan = roomy_at(45.0)
+@pytest.mark.parametrize("visits", LINES)
+def test_a_lathe_for_two_parts_has_a_program_that_is_certified_and_read_back(
+    visits: tuple[str, ...],
+) -> None:
+    plan = lathe_line(visits, 2, 45.0)
     assert plan.cycle is not None
     assert plan.program is not None
     assert plan.cell is not None
@@ -125,7 +162,7 @@ def test_a_lathe_for_two_parts_has_a_program_that_is_certified_and_read_back() -
     assert all(step.report.certified for step in steps if step.trajectory is not None)
     assert plan.program.report.duration == pytest.approx(plan.cycle.period, abs=ROUNDING)
     awaited = {name for step in plan.program.movements for name in step.wait_for}
-    assert awaited == {"lathe.1.done", "lathe.2.done", "washer.done", "gauge.done"}
+    assert awaited == {f"{name}.done" for name in tended(visits)}
     assert plan.saving.common > plan.saving.joules
     assert plan.saving.common_period >= plan.cycle.period - ROUNDING
     for cell in (plan.cell, plan.run_cell):
@@ -142,9 +179,8 @@ def test_a_program_in_which_slots_take_long_to_repeat_is_refused(
         replace(machine, buffer=1) if machine.name == "lathe" else machine
         for machine in CELL.equipment
     )
-    planner = Planner(replace(CELL, equipment=machines), clock=lambda: 0.0)
     with pytest.raises(RequestError, match="2 parts until all have used their slots in turn"):
-        planner.plan_steady_cycle()
+        steady(replace(CELL, equipment=machines))
 
 
 def test_machines_that_can_be_full_in_too_many_ways_are_refused_before_anything_is_planned(
@@ -289,8 +325,9 @@ def test_the_saving_names_its_baseline_and_holds_zero_only_where_it_says_so() ->
     assert "the controller's own timers" in saving.sentence
 
 
+@pytest.mark.long
 def test_the_page_s_figures_are_those_that_are_planned() -> None:
-    plan = at_thirty()
+    plan = steady(CELL, work=0, parts_per_hour=30.0, saving=True)
     saving = plan.saving
     assert saving is not None
     assert plan.cycle is not None
@@ -314,7 +351,7 @@ def test_the_cycle_is_written_as_a_cell_that_is_planned_as_a_program() -> None:
     again = cell_from_yaml(cell_to_yaml(plan.cell))
     assert [finding.severity for finding in check_cell(again)].count("error") == 0
     assert len([step for step in again.program if step.attach]) == len(plan.cycle.visits)
-    program = Planner(again, clock=lambda: 0.0).plan_program()
+    program = Planner(again, clock=lambda: 0.0).plan_program(max_iterations=LITTLE)
     assert program.status.ok, program.status.message
 
 
@@ -330,7 +367,7 @@ def routed(cell: Cell, visits: tuple[str, ...]) -> Cell:
 
 def test_one_machine_alone_is_tended_too() -> None:
     cell = routed(CELL, ("infeed_pick", "gauge_seat", "outfeed_place"))
-    plan = Planner(cell, clock=lambda: 0.0).plan_steady_cycle()
+    plan = steady(cell)
     assert plan.cycle is not None
     assert plan.cycle.order == ((0, 0), (1, 0))
     assert plan.cycle.period >= 12.0
@@ -343,9 +380,9 @@ def test_fixed_order_and_no_process_cost_what_a_planned_program_costs(over: floa
     machines = tuple(
         replace(machine, process=1e-3) if machine.process else machine for machine in cell.equipment
     )
-    planner = Planner(replace(cell, equipment=machines), clock=lambda: 0.0)
-    fastest = planner.plan_steady_cycle().fastest
-    plan = planner.plan_steady_cycle(parts_per_hour=3600.0 / (over * fastest))
+    cell = replace(cell, equipment=machines)
+    fastest = steady(cell, work=0).fastest
+    plan = steady(cell, work=0, parts_per_hour=3600.0 / (over * fastest))
     assert plan.cycle is not None
     assert plan.cell is not None
     assert plan.request is not None
@@ -360,9 +397,8 @@ def test_fixed_order_and_no_process_cost_what_a_planned_program_costs(over: floa
 @pytest.mark.long
 def test_two_units_are_never_dearer_and_every_one_of_their_parts_is_made() -> None:
     cell = routed(CELL, ("infeed_pick", "washer_basket", "gauge_seat", "outfeed_place"))
-    planner = Planner(cell, clock=lambda: 0.0)
-    one = planner.plan_steady_cycle(parts_per_hour=50.0)
-    two = planner.plan_steady_cycle(parts_per_hour=50.0, units=2, cycles=2)
+    one = steady(cell, parts_per_hour=50.0)
+    two = steady(cell, parts_per_hour=50.0, units=2, cycles=2)
     assert one.cycle is not None
     assert two.cycle is not None
     assert two.run is not None
@@ -404,10 +440,8 @@ def with_buffer(*, at_will: bool) -> Cell:
 
 
 def test_a_buffer_is_used_where_that_pays_and_parts_go_through_it() -> None:
-    through = Planner(with_buffer(at_will=False), clock=lambda: 0.0)
-    at_will = Planner(with_buffer(at_will=True), clock=lambda: 0.0)
-    forced = through.plan_steady_cycle(parts_per_hour=30.0, cycles=2)
-    chosen = at_will.plan_steady_cycle(parts_per_hour=30.0)
+    forced = steady(with_buffer(at_will=False), parts_per_hour=30.0, cycles=2)
+    chosen = steady(with_buffer(at_will=True), parts_per_hour=30.0)
     assert chosen.stations == ("infeed_pick", "washer_basket", "outfeed_place")  # time to spare
     assert chosen.joules <= forced.joules * (1.0 + SETTLED)
     assert chosen.fastest <= forced.fastest * (1.0 + SETTLED)
@@ -434,5 +468,5 @@ def test_a_way_by_states_goes_without_a_machine_that_is_switched_off(name: str) 
             Planner(cell, clock=lambda: 0.0).plan_steady_cycle()
     else:
         assert len(cell.part_routes) == 2
-        plan = Planner(cell, clock=lambda: 0.0).plan_steady_cycle()
+        plan = steady(cell)
         assert plan.stations == ("infeed_pick", "washer_basket", "outfeed_place")

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tending import steady
 
 from ir_description import Cell, load_cell
 from ir_description.cell import ProcessTimes
-from ir_planner import Planner, RequestError, SteadyPlan
+from ir_planner import RequestError, SteadyPlan
 from ir_planner.flexible import counted_times, outage_replay, with_counted_times
 from ir_planner.flexible.surprises import BY_ITSELF, KNOWN, POLICIES, TIMEOUTS, Replay
 
@@ -37,7 +38,7 @@ def two_machines() -> Cell:
 
 @cache
 def planned() -> SteadyPlan:
-    return Planner(two_machines(), clock=lambda: 0.0).plan_steady_cycle(cycles=CYCLES)
+    return steady(two_machines(), cycles=CYCLES)
 
 
 def test_without_surprises_the_schedule_is_the_plan() -> None:
@@ -61,8 +62,7 @@ def test_without_surprises_parts_in_slots_are_in_the_plan_s_time() -> None:
         replace(machine, capacity=2) if machine.name == "washer" else machine
         for machine in cell.equipment
     )
-    planner = Planner(replace(cell, equipment=machines), clock=lambda: 0.0)
-    plan = planner.plan_steady_cycle(cycles=2)
+    plan = steady(replace(cell, equipment=machines), cycles=2)
     assert plan.run is not None
     assert plan.cycle is not None
     assert plan.cycle.most == (2, 1)
@@ -114,7 +114,6 @@ def test_who_knows_the_times_needs_no_more_and_longer_times_are_kept() -> None:
     )
     cell = replace(cell, equipment=machines)
     for share in (0.0, 1.0):
-        planner = Planner(with_counted_times(cell, share), clock=lambda: 0.0)
-        counted = counted_times(planner.plan_steady_cycle(cycles=8), share, 3)
+        counted = counted_times(steady(with_counted_times(cell, share), cycles=8), share, 3)
         assert counted.known <= counted.joules * (1.0 + ROUNDING)
         assert counted.times["gauge"] == (20.0 if share else 12.0)
