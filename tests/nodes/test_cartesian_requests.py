@@ -190,7 +190,7 @@ def test_a_program_drives_a_path_that_is_named_as_a_stop() -> None:
         draw_seed=lambda: 7,
         log=print,
     )
-    request = PlanProgram.Request(stations=["bead"])
+    request = PlanProgram.Request(stations=["bead"], savings=False)
     found = own.guarded(own.plan_program)(request, PlanProgram.Response())
     assert found.status.code == StatusCode.SUCCESS, found.status.message
     assert [step.kind for step in found.movements] == ["regional", PlannedMovement.CARTESIAN]

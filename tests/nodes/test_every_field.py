@@ -36,8 +36,8 @@ from ir_values.errors import CallTimedOutError
 
 DRIVER = {"backend": "ideal", "wake_port": 0}
 # of each service and action; of all
-SAMPLED = 2
-SAMPLED_HUGE = 4
+SAMPLED = 1
+SAMPLED_HUGE = 2
 ANSWERED = 60.0  # s; 10 MB take a loaded machine long
 RUNS = 0.5  # s; a goal that makes sense after all is canceled then
 ENOUGH = 5  # that went wrong: each may have taken a minute
