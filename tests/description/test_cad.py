@@ -377,10 +377,10 @@ def test_a_mesh_of_very_many_triangles_is_simplified_and_all_of_it_is_contained(
 ) -> None:
     pytest.importorskip("fast_simplification")
     dense = c_frame()
-    for _ in range(3):
+    for _ in range(2):
         dense = convex._cut(dense)
-    monkeypatch.setattr(convex, "TRIANGLES_MAX", 1_000)
-    monkeypatch.setattr(convex, "SIMPLE", 200)
+    monkeypatch.setattr(convex, "TRIANGLES_MAX", 300)
+    monkeypatch.setattr(convex, "SIMPLE", 100)
     pieces = convex.convex_pieces(dense, 8)
     assert pieces.simplified == len(dense)
     assert f"all of its {len(dense)}" in pieces.sentence

@@ -184,7 +184,9 @@ CARRIED = (
 )
 
 
-@pytest.mark.parametrize("mass", [*(pytest.param(mass, marks=pytest.mark.long) for mass in (0, 50)), 150])
+@pytest.mark.parametrize(
+    "mass", [*(pytest.param(mass, marks=pytest.mark.long) for mass in (0, 50)), 150]
+)
 def test_a_comparison_carries_what_load_says(
     mass: int, planner: Planner, followed: Callable[..., Followed]
 ) -> None:

@@ -45,7 +45,9 @@ def send(
     wait_for(client.server_is_ready, what="plan is offered")
 
     def goals(count: int) -> list[Any]:
-        goal = Plan.Goal(stations=["park"], options=PlanOptions(planning_time=PATIENCE))
+        goal = Plan.Goal(
+            stations=["park"], savings=False, options=PlanOptions(planning_time=PATIENCE)
+        )
         futures = [ros_executor.run(lambda: client.send_goal_async(goal)) for _ in range(count)]
         wait_for(lambda: all(future.done() for future in futures), what="goals are accepted")
         return [future.result() for future in futures]
