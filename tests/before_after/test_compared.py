@@ -13,7 +13,7 @@ from ir_description import ProgramStep
 from ir_krl import follow, parse
 from ir_msgs_py.savings import BeforeAfter
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner import Planner, RequestError
+from ir_planner import Planner, ProgramPlan, RequestError
 from ir_planner.before_after import (
     Today,
     TodayMotion,
@@ -103,13 +103,12 @@ def test_changes_are_the_largest_savings_and_the_least_work_comes_first(
     assert "1 stop less" in passed.words
 
 
-def test_the_common_program_saves_what_the_planner_says(planner: Planner) -> None:
+def test_the_common_program_saves_what_the_planner_says(
+    planned: ProgramPlan, common: BeforeAfter
+) -> None:
     """Two computations of one figure: the answer's savings, and the sides of the comparison."""
-    park = planner.cell.park
-    found = before_after_common(planner, ("p1", "home"), park)
-    plan = planner.plan_program(stations=("p1", "home"), start=park, savings=True)
-    total = plan.savings.total
-    saving = found.sides[0].saving
+    total = planned.savings.total
+    saving = common.sides[0].saving
     assert saving.common == pytest.approx(total.common)
     assert saving.saved == pytest.approx(total.saved)
     assert (saving.saved_low, saving.saved_high) == pytest.approx(
@@ -170,11 +169,10 @@ def test_pauses_alone_are_nothing_to_compare(planner: Planner) -> None:
 
 
 def test_a_cells_program_that_begins_in_a_posture_is_todays_that_starts_there(
-    planner: Planner,
+    planner: Planner, planned: ProgramPlan
 ) -> None:
     """The first PTP HOME only leads onto the path, so that no step of today's matched it."""
-    plan = planner.plan_program(stations=("p1", "home"), start=planner.cell.machine_home)
-    moves = [step.trajectory for step in plan.movements if step.trajectory is not None]
+    moves = [step.trajectory for step in planned.movements if step.trajectory is not None]
     scene = planner.scene("")
     ends = [one.positions[-1] for one in moves]
     stretches = tuple(

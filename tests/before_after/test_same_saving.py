@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ir_cli.ros.plan_recording import RecordedRequest, write_plan
-from ir_planner import Planner
-from ir_planner.before_after import before_after_common
+from ir_msgs_py.savings import BeforeAfter
+from ir_planner import Planner, ProgramPlan
 from ir_recorder import analyse, findings, read_recording
 from ir_recorder.analysis.production import production_of
 from ir_recorder.report import report_html
@@ -17,15 +17,12 @@ from ir_recorder.report.costs import Costs
 from ir_recorder.report.money_text import yearly_money
 from ir_recorder.report.program_comparison import before_after_html, year_of
 
-STATIONS = ("p1", "p2", "home")
 
-
-def test_comparison_and_report_of_a_plan_show_one_saving(planner: Planner, tmp_path: Path) -> None:
-    start = planner.cell.machine_home
-    compared = before_after_common(planner, STATIONS, start)
-    plan = planner.plan_program(stations=STATIONS, start=start, savings=True)
-    request = RecordedRequest(STATIONS, savings=True)
-    file = write_plan(tmp_path / "plan.mcap", plan, request, planner)
+def test_comparison_and_report_of_a_plan_show_one_saving(
+    planner: Planner, planned: ProgramPlan, common: BeforeAfter, tmp_path: Path
+) -> None:
+    request = RecordedRequest(("p1", "home"), savings=True)
+    file = write_plan(tmp_path / "plan.mcap", planned, request, planner)
     analysis = analyse(read_recording(file))
     cycle = production_of(analysis)
     assert cycle is not None
@@ -37,7 +34,7 @@ def test_comparison_and_report_of_a_plan_show_one_saving(planner: Planner, tmp_p
             shift_hours=rng.uniform(4.0, 8.0),
             days_per_year=rng.uniform(50.0, 300.0),
         )
-        year = year_of(compared, compared.planned, costs)
+        year = year_of(common, common.planned, costs)
         found = costs.saving_of_year(cycle)
         assert found is not None
         assert found.value == pytest.approx(year.saved.value, rel=1e-9)
@@ -49,7 +46,7 @@ def test_comparison_and_report_of_a_plan_show_one_saving(planner: Planner, tmp_p
         assert sum(share.energy for share in cycle.modes.values()) == pytest.approx(cycle.energy)
 
         pages = (
-            before_after_html(compared, planner.cell, costs),
+            before_after_html(common, planner.cell, costs),
             report_html(analysis, findings(analysis), costs=costs),
         )
         for joules in (found.value, energy.value):
