@@ -66,6 +66,7 @@ def doubted(samples: Samples) -> str:
     return " ".join(doubts(estimate, found).sentences)
 
 
+@pytest.mark.long
 def test_nothing_speaks_against_good_data() -> None:
     assert doubted(metered(1)) == ""
 
@@ -131,6 +132,7 @@ def test_columns_that_were_taken_for_each_other_are_named() -> None:
     assert f"the columns of {joints[1]} and {joints[2]} swapped" in doubted(swapped)
 
 
+@pytest.mark.long
 def test_columns_of_a_wrist_that_are_exchanged_are_doubted_or_said_to_be_undecided() -> None:
     model, prior = model_of(ROBOT)
     swapped = with_columns(drawn_meter(1), [0, 1, 2, 4, 3, 5], np.ones(6))
