@@ -18,24 +18,16 @@ from ir_description import data_sheet, load_power_data
 from ir_recorder.measure import PowerModel
 
 
+@pytest.mark.parametrize("cell", ["open", pytest.param("demo", marks=pytest.mark.long)])
 def test_every_movement_is_certified_and_begins_where_the_one_before_ended(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    cell: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = [
-        "energy",
-        "excite",
-        "demo",
-        "--seconds",
-        "12",
-        "--postures",
-        "1",
-        "--output",
-        str(tmp_path),
-    ]
+    words = ["energy", "excite", cell, "--seconds", "12", "--postures", "1"]
+    words += ["--output", str(tmp_path)]
     assert main([*words, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     page = yaml.safe_load((tmp_path / "programme.yaml").read_text())
-    planner = planner_of("demo")
+    planner = planner_of(cell)
     names = planner.cell.robot.joint_names
     here = np.array(planner.cell.machine_home)
     movements = [step for step in page["steps"] if "trajectory" in step]
