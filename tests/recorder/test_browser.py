@@ -377,7 +377,7 @@ def test_a_grip_is_a_gap_with_its_name_in_the_clearance(
     page.close()
 
 
-@pytest.mark.parametrize("size", [DESK, PHONE])
+@pytest.mark.parametrize("size", [pytest.param(DESK, marks=pytest.mark.long), PHONE])
 def test_the_emergency_stop_is_always_in_reach_and_says_what_ends_it(
     browser: Any,
     live: tuple[LiveServer, Stream, list[tuple[str, bool]]],

@@ -55,7 +55,10 @@ def robots(analysis: Analysis, costs: Costs) -> str:
 PAGES: tuple[Callable[[Analysis, Costs], str], ...] = (report, recordings, fleet, robots)
 
 
-@pytest.mark.parametrize("made", PAGES)
+@pytest.mark.parametrize(
+    "made",
+    [report, fleet, *(pytest.param(made, marks=pytest.mark.long) for made in (recordings, robots))],
+)
 def test_a_typed_price_says_what_a_page_of_that_price_says(
     browser: Any, analysis: Analysis, tmp_path: Path, made: Callable[[Analysis, Costs], str]
 ) -> None:

@@ -56,7 +56,8 @@ def _reader() -> ModuleType:
 READ = _reader()
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 AWAY = np.radians([25.0, -70.0, 95.0, 0.0, 55.0, 20.0])
-SEEDS = range(4)
+# of runs: without movements, and with most; and of prices
+SEEDS = [0, 3, *(pytest.param(seed, marks=pytest.mark.long) for seed in (1, 2))]
 
 
 def drawn(new_run: Callable[[], Any], seed: int) -> Any:
