@@ -12,6 +12,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from glob import glob
+from pathlib import Path
 
 from setuptools import Extension, find_packages, setup
 from setuptools.command.build_ext import build_ext
@@ -72,7 +73,7 @@ def extensions() -> list[Extension]:
             f"{PACKAGE}.{name}",
             files,
             include_dirs=[*include, "cpp"],
-            depends=[*glob("cpp/*.hpp"), "setup.py"],
+            depends=[*glob("cpp/*.[ch]pp"), "setup.py"],
             define_macros=[("IR_MODULE", name)],
             language="c++",
             optional=True,
@@ -89,6 +90,20 @@ def native_features(compiler: str) -> list[str]:
     macros = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     defined = {line.split()[1] for line in macros.splitlines()}
     return [feature for macro, feature in FEATURES.items() if macro in defined]
+
+
+def with_bindings_joined(sources: list[str], folder: str) -> list[str]:
+    """The sources, with one file in place of those that use pybind11: to compile its headers takes
+    several times as long as what they bind.
+    """
+    bindings = [file for file in sources if "pybind11" in Path(file).read_text(encoding="utf-8")]
+    if not bindings:
+        return sources
+    joined = Path(folder, "bindings.cpp")
+    joined.parent.mkdir(parents=True, exist_ok=True)
+    lines = [f'#include "{os.path.abspath(file)}"\n' for file in bindings]
+    joined.write_text("".join(lines), encoding="utf-8")
+    return [str(joined), *(file for file in sources if file not in bindings)]
 
 
 class BuildVariants(build_ext):
@@ -150,6 +165,7 @@ class BuildVariants(build_ext):
         ext.define_macros = [*ext.define_macros, ("IR_NATIVE_FEATURES", f'"{",".join(features)}"')]
         own = copy.copy(self)  # its own folder for objects: both variants compile the same files
         own.build_temp = os.path.join(self.build_temp, ext.name)
+        ext.sources = with_bindings_joined(ext.sources, own.build_temp)
         own.compiler = copy.copy(self.compiler)
         own.compiler.compile = self.compile_files_side_by_side
         super(BuildVariants, own).build_extension(ext)

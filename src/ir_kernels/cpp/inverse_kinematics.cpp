@@ -8,7 +8,7 @@
 #include "inverse_kinematics_spherical.hpp"
 
 namespace py = pybind11;
-namespace core = ir::inverse;
+namespace inverse = ir::inverse;
 
 namespace {
 
@@ -59,10 +59,10 @@ class SphericalWristIk {
   py::object solve(const Array& poses) const {
     if (poses.ndim() != 3 || poses.shape(1) != 4 || poses.shape(2) != 4)
       throw std::invalid_argument("poses have to be (N, 4, 4)");
-    core::IkSolutions found;
+    inverse::IkSolutions found;
     {
       py::gil_scoped_release released;
-      found = core::solve(arm_, poses.data(), poses.shape(0));
+      found = inverse::solve(arm_, poses.data(), poses.shape(0));
     }
     if (found.refused >= 0) return py::none();
     const auto M = static_cast<py::ssize_t>(found.pose.size());
@@ -75,18 +75,18 @@ class SphericalWristIk {
     target[0] = value.attr("real").cast<double>();
     target[1] = value.attr("imag").cast<double>();
   }
-  core::SphericalArm arm_{};
+  inverse::SphericalArm arm_{};
 };
 
 py::tuple ccd(const Array& origin, const Array& axis, const Array& base, const Array& tcp, const Array& pose,
               const Array& low, const Array& high, double rotation_length, const Array& starts, double xi,
               long max_sweeps, long newton_steps, double newton_tolerance) {
   const py::ssize_t n = low.size();
-  if (n < 1 || n > core::kMaxJoints || origin.size() != 16 * n || axis.size() != 3 * n || base.size() != 16 ||
+  if (n < 1 || n > inverse::kMaxJoints || origin.size() != 16 * n || axis.size() != 3 * n || base.size() != 16 ||
       tcp.size() != 16 || pose.size() != 16 || high.size() != n || starts.ndim() != 2 || starts.shape(1) != n)
     throw std::invalid_argument("ccd: sizes of the arrays don't belong together, or more than " +
-                                std::to_string(core::kMaxJoints) + " joints");
-  core::CcdProblem problem(static_cast<int>(n), origin.data(), axis.data(), base.data(), tcp.data(), pose.data(),
+                                std::to_string(inverse::kMaxJoints) + " joints");
+  inverse::CcdProblem problem(static_cast<int>(n), origin.data(), axis.data(), base.data(), tcp.data(), pose.data(),
                            low.data(), high.data(), rotation_length);
   problem.xi = xi;
   problem.max_sweeps = max_sweeps;
@@ -95,11 +95,11 @@ py::tuple ccd(const Array& origin, const Array& axis, const Array& base, const A
   const py::ssize_t P = starts.shape(0);
   Array q({P, n}), psi(P), distance(P), angle(P);
   py::array_t<std::int64_t> sweeps(P), steps(P);
-  const core::CcdArrays out{q.mutable_data(),     psi.mutable_data(),    distance.mutable_data(),
+  const inverse::CcdArrays out{q.mutable_data(),     psi.mutable_data(),    distance.mutable_data(),
                             angle.mutable_data(), sweeps.mutable_data(), steps.mutable_data()};
   {
     py::gil_scoped_release released;
-    core::run(problem, starts.data(), P, out);
+    inverse::run(problem, starts.data(), P, out);
   }
   return py::make_tuple(q, psi, distance, angle, sweeps, steps);
 }

@@ -1,17 +1,16 @@
 // A module of its own that runs on any processor: may the native build be loaded on this one?
-#include <pybind11/pybind11.h>
+// Plain C interface of Python: this module is compiled for two functions.
+#include <Python.h>
 
-#include <string>
+#include <algorithm>
+#include <string_view>
 
 namespace {
 
 // Whether this processor has all that `features` (comma separated) names; an unknown name counts as missing.
-bool cpu_supports_all(const std::string& features) {
-  std::size_t begin = 0;
-  while (begin < features.size()) {
-    std::size_t end = features.find(',', begin);
-    if (end == std::string::npos) end = features.size();
-    const std::string name = features.substr(begin, end - begin);
+bool cpu_supports_all(std::string_view features) {
+  while (!features.empty()) {
+    const std::string_view name = features.substr(0, features.find(','));
     bool supported = false;
 #if defined(__x86_64__)
 #define IR_FEATURE(text) \
@@ -24,15 +23,34 @@ bool cpu_supports_all(const std::string& features) {
 #undef IR_FEATURE
 #endif
     if (!supported) return false;
-    begin = end + 1;
+    features.remove_prefix(std::min(name.size() + 1, features.size()));
   }
   return true;
 }
 
+PyObject* native_runs_here(PyObject*, PyObject*) { return PyBool_FromLong(cpu_supports_all(IR_NATIVE_FEATURES)); }
+
+PyMethodDef functions[] = {
+    {"native_runs_here", native_runs_here, METH_NOARGS, "Whether this processor has all that the native build needs."},
+    {nullptr, nullptr, 0, nullptr},
+};
+PyModuleDef module = {
+    PyModuleDef_HEAD_INIT,
+    "_processor",
+    "Which instructions the native build needs, and whether this processor has them.",
+    -1,
+    functions,
+    nullptr,
+    nullptr,
+    nullptr,
+    nullptr,
+};
+
 }  // namespace
 
-PYBIND11_MODULE(_processor, m) {
-  m.doc() = "Which instructions the native build needs, and whether this processor has them.";
-  m.def("native_runs_here", [] { return cpu_supports_all(IR_NATIVE_FEATURES); });
-  m.attr("native_features") = IR_NATIVE_FEATURES;
+PyMODINIT_FUNC PyInit__processor() {
+  PyObject* created = PyModule_Create(&module);
+  if (created != nullptr && PyModule_AddStringConstant(created, "native_features", IR_NATIVE_FEATURES) < 0)
+    Py_CLEAR(created);
+  return created;
 }
