@@ -140,7 +140,7 @@ def test_a_hall_too_large_for_floats_is_computed_in_doubles() -> None:
     )
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_no_translation_shorter_than_the_depth_parts_two_bodies(seed: int) -> None:
     rng = np.random.default_rng(seed)

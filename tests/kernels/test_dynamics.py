@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pinocchio
 import pytest
+from builds import slow_reference
 from robots import (
     LoadLiteral,
     RobotLiteral,
@@ -200,6 +201,7 @@ def test_lagrange_form_equals_newton_euler(core: Any) -> None:
     assert relative(lagrange, arm) < 1e-7  # of the central differences
 
 
+@slow_reference
 def test_free_motion_without_friction_keeps_its_energy(core: Any) -> None:
     """Energy of arm, rotors and gas is constant when no motor works (fourth-order Runge-Kutta, 0.5
     s).
