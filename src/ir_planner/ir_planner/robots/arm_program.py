@@ -223,8 +223,8 @@ def planned_arm(robot: str, request: ProgramRequest, journal: Journal) -> ArmPro
 
 def check_repeatable(robot: str, cell: Cell) -> None:
     """Refuse, by RequestError, what no cycle of several robots is planned with: machines that
-    change, waits for what this program doesn't bring about, a program without movements or one that
-    ends with a part in the gripper.
+    change, waits for what this program doesn't bring about, a wait of the first cycle that nothing
+    ends, a program without movements or one that ends with a part in the gripper.
     """
     switches = {m.switch.signal: m.name for m in cell.equipment if m.switch is not None}
     if not any(step.kind != "PAUSE" for step in cell.program):
@@ -236,6 +236,7 @@ def check_repeatable(robot: str, cell: Cell) -> None:
     own = [signal for step in cell.program for signal in step.set_signals]
     answers = {signal.name: signal for signal in cell.signals if signal.follows}
     places = cell.parts_at_start()
+    before: set[Signal] = set()
     for k, step in enumerate(cell.program, start=1):
         for signal in step.set_signals:
             if signal.name in switches:
@@ -255,6 +256,14 @@ def check_repeatable(robot: str, cell: Cell) -> None:
                     "planned with several robots, and those between robots follow from the "
                     "movements; leave it out",
                 )
+            if _asked(answer, signal) not in before and answer.initial != signal.value:
+                raise RequestError(
+                    StatusCode.INVALID_GOAL_CONSTRAINTS,
+                    f"step {k} of the program of {robot} waits for {signal.name} before the "
+                    f"program sets {answer.follows}, so the first cycle waits for ever: give "
+                    f"{signal.name} the level that it waits for as `initial`",
+                )
+        before.update(step.set_signals)
         places = places.after(step)
     if places.held:
         raise RequestError(
@@ -296,9 +305,7 @@ def _begins(cell: Cell, machine: str) -> bool:
 
 
 def _lags(cell: Cell, steps: Sequence[PlannedMovement]) -> tuple[Lag, ...]:
-    """Between movements that set signals and those that wait for what follows them. Raises
-    RequestError for a wait of the first cycle that nothing ends.
-    """
+    """Between movements that set signals and those that wait for what follows them."""
     answers = {signal.name: signal for signal in cell.signals if signal.follows}
     lags = []
     for later, step in enumerate(steps):
@@ -309,13 +316,6 @@ def _lags(cell: Cell, steps: Sequence[PlannedMovement]) -> tuple[Lag, ...]:
                 k for k, each in enumerate(steps) if asked in map(Signal.parse, each.set_signals)
             ]
             before = [k for k in setters if k < later]
-            if not before and answer.initial != signal.value:
-                raise RequestError(
-                    StatusCode.INVALID_GOAL_CONSTRAINTS,
-                    f"the movement to {step.to_station} waits for {signal.name} before the program "
-                    f"sets {answer.follows}, so the first cycle waits for ever: give "
-                    f"{signal.name} the level that it waits for as `initial`",
-                )
             seconds = answer.delay
             if answer.process:
                 seconds = cell.machine(answer.process).process if signal.value else 0.0
