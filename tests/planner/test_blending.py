@@ -36,6 +36,7 @@ CELLS = ("open", "kr6_bench", "ur10e_bench")
 MARGIN = 0.02  # m
 ROUNDED = 1e-5  # m between two codes
 SAMPLED = 2e-4  # m and rad that the nearest of samples 0.1 ms apart may be farther
+LITTLE = {"max_iterations": 20_000}
 OBJECTIVES = ("time", "time_and_energy", "movement_cost")
 
 
@@ -122,8 +123,14 @@ def judged(planner: Planner, movements: tuple[PlannedMovement, ...]) -> None:
             assert (judge.distances(q) > scene.thresholds(MARGIN) - ROUNDED).all()
 
 
-@pytest.mark.parametrize("name", CELLS)
-@pytest.mark.parametrize("seeds", [range(1), pytest.param(range(1, 7), marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("name", "seeds"),
+    [
+        ("kr6_bench", range(1)),
+        ("ur10e_bench", range(1)),
+        *(pytest.param(name, range(7), marks=pytest.mark.long) for name in CELLS),
+    ],
+)
 def test_a_program_without_rests_costs_no_more_and_passes_all_stops(
     name: str, seeds: range
 ) -> None:
@@ -152,9 +159,9 @@ def test_a_program_without_rests_costs_no_more_and_passes_all_stops(
 
 @pytest.mark.parametrize("name", ["open", pytest.param("kr6_bench", marks=pytest.mark.long)])
 def test_a_cycle_takes_fewer_joules_and_may_be_shorter(name: str) -> None:
-    cell, stops = drawn_cell(name, 5)
+    cell, stops = drawn_cell(name, 5, 2)
     planner = Planner(cell, clock=lambda: 0.0)
-    asked = {"stations": tuple(stops), "start": "home"}
+    asked = {"stations": tuple(stops), "start": "home", "max_iterations": 100_000}
     fastest = planner.plan_program(**asked, objective="time")
     cycle = 1.3 * fastest.report.duration
     resting = planner.plan_program(**asked, cycle_time=cycle)
@@ -191,12 +198,16 @@ def ends_at(plan: ProgramPlan, name: str) -> bool:
 def test_where_something_happens_the_robot_stands_still() -> None:
     cell, stops = drawn_cell("open", 2)
     middle = stops[1]
-    passing = Planner(visiting(cell, stops, 0.08), clock=lambda: 0.0).plan_program()
+    passing = Planner(visiting(cell, stops, 0.08), clock=lambda: 0.0).plan_program(**LITTLE)
     rests = [step.kind for step in passing.movements].count(MovementKind.PAUSE)
     assert rests == 0
-    dwelling = Planner(visiting(cell, stops, 0.08, dwell=1.0), clock=lambda: 0.0).plan_program()
+    dwelling = Planner(visiting(cell, stops, 0.08, dwell=1.0), clock=lambda: 0.0).plan_program(
+        **LITTLE
+    )
     assert ends_at(dwelling, middle)
-    standing = Planner(visiting(cell, stops, 0.08, blend=0.0), clock=lambda: 0.0).plan_program()
+    standing = Planner(visiting(cell, stops, 0.08, blend=0.0), clock=lambda: 0.0).plan_program(
+        **LITTLE
+    )
     assert ends_at(standing, middle)
     assert len(standing.movements) > len(passing.movements)
     as_stations = tuple(
@@ -204,7 +215,7 @@ def test_where_something_happens_the_robot_stands_still() -> None:
     )
     said = replace(visiting(cell, stops, None), stations=as_stations)
     read = cell_from_yaml(cell_to_yaml(said), "said.yaml")
-    by_station = Planner(read, clock=lambda: 0.0).plan_program()
+    by_station = Planner(read, clock=lambda: 0.0).plan_program(**LITTLE)
     assert by_station.program_id == passing.program_id
 
 
@@ -219,7 +230,7 @@ def test_contacts_of_one_station_hold_in_a_joined_movement() -> None:
         for station in cell.stations
     )
     planner = Planner(replace(cell, stations=own), clock=lambda: 0.0)
-    plan = planner.plan_program(stations=tuple(stops), start="home", blend=0.08)
+    plan = planner.plan_program(stations=tuple(stops), start="home", blend=0.08, **LITTLE)
     assert plan.status.ok
     joined = 0
     for step in plan.movements:
@@ -239,7 +250,7 @@ def test_contacts_of_one_station_hold_in_a_joined_movement() -> None:
 def test_a_passed_stop_is_written_as_krl_and_driven_without_a_rest_there(style: str) -> None:
     cell, stops = drawn_cell("open", 2)
     planner = Planner(cell, clock=lambda: 0.0)
-    plan = planner.plan_program(stations=tuple(stops), start="home", blend=0.08)
+    plan = planner.plan_program(stations=tuple(stops), start="home", blend=0.08, **LITTLE)
     written = export_krl(planner, plan.movements, "passing", style=style)
     assert written.exported.certified
     assert any(step.passes for step in plan.movements)

@@ -24,7 +24,7 @@ from ir_planner.scene import PlanningScene
 from ir_planner.search import SEARCHES
 from ir_planner.timing import Movement
 
-POINTS = 12
+POINTS = 6
 LAW = 1e-3  # of E: movements are compared at a ladder of values
 DRAWN = 6  # cycle times
 ROUNDING = 1e-3  # of J: slower movements are compared at some durations
@@ -40,7 +40,7 @@ def test_energy_over_cycle_time_keeps_its_laws(cell: str) -> None:
     rng = np.random.default_rng([1, *cell.encode()])
     names = [station.name for station in planner.cell.stations]
     stops = (*(str(name) for name in rng.choice(names, 2, replace=False)), "park")
-    options = PlanOptions(planning_time=100.0)
+    options = PlanOptions(planning_time=100.0, max_iterations=10_000)
     plan = planner.plan_program(stations=stops, options=options, start=park, front_points=POINTS)
     assert plan.status.ok, plan.status.message
     front = plan.front
@@ -105,7 +105,7 @@ def test_a_movement_at_a_value_costs_no_more_than_known_ones_slowed(
     """
     scene = scene_of("table_columns")
     rng = np.random.default_rng(3)
-    for task in rng.choice(np.array(scene.cell.tasks, dtype=object), 2, replace=False):
+    for task in rng.choice(np.array(scene.cell.tasks, dtype=object), 1, replace=False):
         known = [searched(scene, task, objective) for objective in ("time", "time_and_energy")]
         for value in np.exp(rng.uniform(np.log(300.0), np.log(16_000.0), 2)):
             asked = replace(

@@ -229,7 +229,7 @@ def test_energy_over_cycle_time_keeps_the_law_of_waiting(
     free = planned(0.0).report.duration
     scene = scene_with(demo_cell, load_text(demo_cell), power)
     park = np.array(demo_cell.park)
-    times = [0.97 * free, free, 1.1 * free, 1.3 * free, 2.0 * free, 40.0 * free]
+    times = [0.97 * free, free, 1.3 * free, 40.0 * free]
     energies = []
     for cycle_time in times:
         plan = planned(cycle_time)
@@ -250,7 +250,7 @@ def test_too_short_a_cycle_names_the_shortest(planned: Callable[[float], Program
     assert planned(shortest + 1e-3).status.ok
 
 
-POINTS = 9
+POINTS = 5
 
 
 def test_the_front_of_a_program_keeps_the_law_of_waiting(demo_cell: Cell, power: PowerData) -> None:
@@ -263,7 +263,7 @@ def test_the_front_of_a_program_keeps_the_law_of_waiting(demo_cell: Cell, power:
         PlanOptions(planning_time=60.0),
         front_points=POINTS,
     )
-    front = plan_program(request, Work(2_000_000, 1.0, lambda: 0.0)).front
+    front = plan_program(request, Work(30_000, 1.0, lambda: 0.0)).front
     assert len(front) == POINTS
     assert len({plan.program_id for plan in front}) == POINTS
     assert all(plan.report.certified for plan in front)
@@ -284,7 +284,7 @@ def test_without_a_cycle_time_objective_energy_says_that_it_is_slow() -> None:
     start = np.array(planner.cell.park)
 
     def plan(objective: str, cycle_time: float) -> ProgramPlan:
-        options = PlanOptions(objective=objective, planning_time=100.0)
+        options = PlanOptions(objective=objective, planning_time=100.0, max_iterations=10_000)
         return planner.plan_program(
             stations=stops, cycle_time=cycle_time, options=options, start=start
         )

@@ -220,14 +220,20 @@ def test_every_answer_lies_within_its_own_interval() -> None:
     cell = asked.cell
     start = np.array(asked.cell.park)
     name = cell.stations[0].name
-    plan = asked.plan_program(stations=(name, "park"), start=start, savings=True, front_points=3)
+    plan = asked.plan_program(
+        stations=(name, "park"),
+        start=start,
+        savings=True,
+        front_points=3,
+        max_iterations=100_000,
+    )
     assert plan.compared is not None
     programs = (plan, plan.compared, *plan.front)
     reports = [step.report for program in programs for step in program.movements]
     reports += [program.report for program in programs]
     first = plan.movements[0].trajectory
     assert first is not None
-    better = asked.optimize_trajectory(first)
+    better = asked.optimize_trajectory(first, max_iterations=3_000)
     reports += [
         better.before,
         better.after,

@@ -153,7 +153,7 @@ def followed(
     return left
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(
     seed=st.integers(0, 10_000),
     capacities=st.lists(st.integers(1, 3), min_size=MACHINES, max_size=MACHINES),
@@ -185,7 +185,7 @@ def test_parts_go_through_slots_in_turn_and_none_is_taken_too_soon(
             assert last == pytest.approx(cycle.period, abs=ROUNDING * len(cycle.visits))
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(
     seed=st.integers(0, 10_000),
     capacities=st.lists(st.integers(1, 2), min_size=MACHINES, max_size=MACHINES),

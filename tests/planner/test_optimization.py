@@ -211,7 +211,15 @@ def test_where_nothing_is_found_the_obstructing_pair_is_named(scene_of: SceneOf)
     assert not plan.before.certified
 
 
-@pytest.mark.parametrize("objective", ["time", "energy", "movement_cost", "time_and_energy"])
+@pytest.mark.parametrize(
+    "objective",
+    [
+        "movement_cost",
+        "time_and_energy",
+        pytest.param("time", marks=pytest.mark.long),
+        pytest.param("energy", marks=pytest.mark.long),
+    ],
+)
 def test_the_answer_is_never_worse_than_a_certified_original(
     objective: str, full: OptimizationPlan, scene: PlanningScene
 ) -> None:

@@ -153,7 +153,7 @@ def followed(path: CartesianPath, scene: PlanningScene) -> bool:
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(15), pytest.param(range(15, 300), marks=pytest.mark.long)], ids=str
+    "seeds", [range(6), pytest.param(range(6, 300), marks=pytest.mark.long)], ids=str
 )
 def test_what_can_be_followed_beside_a_singularity_is_driven(
     planner: Planner, seeds: range
@@ -168,7 +168,7 @@ def test_what_can_be_followed_beside_a_singularity_is_driven(
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(6, 10), pytest.param(range(60), marks=pytest.mark.long)], ids=str
+    "seeds", [range(6, 8), pytest.param(range(60), marks=pytest.mark.long)], ids=str
 )
 def test_a_seam_beside_the_wrist_takes_no_more_than_its_axes_need(
     planner: Planner, seeds: range
@@ -196,7 +196,7 @@ def by_speeds_alone(trajectory: JointTrajectory, speed: float, scene: PlanningSc
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(2), pytest.param(range(2, 100), marks=pytest.mark.long)], ids=str
+    "seeds", [range(1), pytest.param(range(1, 100), marks=pytest.mark.long)], ids=str
 )
 def test_stairs_of_short_lines_are_driven(planner: Planner, seeds: range) -> None:
     for seed in seeds:
@@ -225,13 +225,12 @@ def test_a_path_that_is_late_is_answered_by_the_first_speed_that_was_begun(
     planner: Planner,
 ) -> None:
     late = Planner("open", clock=itertools.count(0.0, 10.0).__next__)
-    for seed in range(3):
-        path = stairs(seed)
-        speeds = []
-        for each in (planner, late):
-            plan = each.plan_cartesian(path)
-            assert plan.report.certified, (seed, plan.status.message)
-            assert plan.info.truncated == (each is late)
-            speeds.append(sum(stage.name == "proof" for stage in plan.info.stages))
-        assert speeds[1] <= speeds[0], seed
-        assert speeds[1] == 1, seed
+    path = stairs(0)
+    speeds = []
+    for each in (planner, late):
+        plan = each.plan_cartesian(path)
+        assert plan.report.certified, plan.status.message
+        assert plan.info.truncated == (each is late)
+        speeds.append(sum(stage.name == "proof" for stage in plan.info.stages))
+    assert speeds[1] <= speeds[0]
+    assert speeds[1] == 1

@@ -53,7 +53,7 @@ def plan(planner: Planner) -> ProgramPlan:
 
 
 def planned(planner: Planner, cycle: float = 0.0, *, savings: bool = False) -> ProgramPlan:
-    options = PlanOptions(planning_time=60.0)
+    options = PlanOptions(planning_time=60.0, max_iterations=3_000)
     found = planner.plan_program(
         stations=STOPS,
         cycle_time=cycle,

@@ -220,7 +220,9 @@ def test_a_program_that_rests_beyond_the_table_says_where() -> None:
     row = RestRow(tuple((HOME + 0.1).tolist()), 500.0, (200.0, 100.0, 50.0))
     power = replace(POWER, rest_table=RestTable(SAVING, (row,)))
     robot = replace(CELL.robot, controller=power)
-    plan = Planner(replace(CELL, robot=robot)).plan_program(options=PlanOptions(seed=1))
+    plan = Planner(replace(CELL, robot=robot)).plan_program(
+        options=PlanOptions(seed=1, max_iterations=1_500)
+    )
     pauses = [step for step in plan.movements if step.is_pause and step.power_mode]
     assert pauses
     assert "outside of them" in plan.status.message

@@ -230,7 +230,9 @@ def test_programs_and_savings_are_the_same_on_one_core_and_on_two(
         )
         planner = Planner("open", clock=lambda: 0.0)  # no ceiling cuts the plan
         park = np.array(planner.cell.park)
-        plan = planner.plan_program(stations=("p1", "park"), start=park, savings=True)
+        plan = planner.plan_program(
+            stations=("p1", "park"), start=park, savings=True, max_iterations=3_000
+        )
         answers.append((plan.program_id, plan.savings, plan.info.iterations))
     assert answers[0] == answers[1]
     assert answers[0][1].available

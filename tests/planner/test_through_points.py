@@ -53,8 +53,21 @@ def cost(report: TrajectoryReport, planner: Planner, objective: str) -> float:
     return report.duration if objective == "time" else joules
 
 
-@pytest.mark.parametrize("cell", CELLS)
-@pytest.mark.parametrize("seeds", [range(4), pytest.param(range(4, 30), marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("cell", "seeds"),
+    [
+        ("open", range(1)),
+        ("kr6_bench", range(4)),
+        *(
+            pytest.param(cell, seeds, marks=pytest.mark.long)
+            for cell, seeds in (
+                ("open", range(1, 30)),
+                ("kr6_bench", range(4, 30)),
+                ("ur10e_bench", range(30)),
+            )
+        ),
+    ],
+)
 def test_points_cost_no_more_than_stopping_at_each(
     planners: dict[str, Planner], cell: str, seeds: range
 ) -> None:
