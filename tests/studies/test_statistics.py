@@ -233,7 +233,7 @@ def study_of_a_pair(tmp_path_factory: pytest.TempPathFactory) -> StudyOfAPair:
     means = Means(1, progress=lambda phase, done, of, best: heard.append((phase, done, of)))
     answer = study.run(folder, means)
     kept = json.loads((folder / "results.jsonl").read_text().splitlines()[-1])
-    row = {name: value for name, value in kept.items() if name != "key"}
+    row = {name: value for name, value in kept.items() if name not in ("key", "outcome")}
     return StudyOfAPair(study, folder, answer, row, heard)
 
 
