@@ -116,6 +116,7 @@ def test_the_common_program_saves_what_the_planner_says(
     )
 
 
+@pytest.mark.long
 def test_the_planners_own_program_as_todays_saves_next_to_nothing(planner: Planner) -> None:
     """Law: what is optimal already can't be improved by much."""
     plan = planner.plan_program(stations=("p1", "home"), start=planner.cell.machine_home)
@@ -126,6 +127,7 @@ def test_the_planners_own_program_as_todays_saves_next_to_nothing(planner: Plann
     assert abs(found.planned.saving.share) < 0.01
 
 
+@pytest.mark.long
 def test_a_motion_that_is_faster_than_the_limits_is_compared_with_the_free_program(
     planner: Planner,
 ) -> None:

@@ -81,6 +81,7 @@ def distance_to_the_seam(places: np.ndarray, origin: np.ndarray) -> np.ndarray:
     return np.asarray(np.min(away, axis=0))
 
 
+@pytest.mark.long
 def test_every_program_works_along_the_seam_at_its_speed(
     welded: BeforeAfter, planner: Planner
 ) -> None:

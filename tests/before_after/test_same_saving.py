@@ -18,6 +18,7 @@ from ir_recorder.report.money_text import yearly_money
 from ir_recorder.report.program_comparison import before_after_html, year_of
 
 
+@pytest.mark.long
 def test_comparison_and_report_of_a_plan_show_one_saving(
     planner: Planner, planned: ProgramPlan, common: BeforeAfter, tmp_path: Path
 ) -> None:

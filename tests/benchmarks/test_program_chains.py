@@ -15,7 +15,7 @@ from ir_planner import Goal, Planner
 from ir_planner.timing.ptp import free_law, path_limits
 from ir_planner.timing.time_law import GRID_S
 
-OBJECTIVES = ("time_and_energy", "movement_cost")
+OBJECTIVES = ("time_and_energy", pytest.param("movement_cost", marks=pytest.mark.long))
 
 
 @pytest.fixture(scope="module")

@@ -32,6 +32,7 @@ def test_one_size_has_no_exponent() -> None:
     assert np.isnan(exponent([10.0], [1.0]))
 
 
+@pytest.mark.long
 def test_a_step_is_measured_in_a_process_of_its_own() -> None:
     def busy() -> object:
         return np.ones(20_000_000).sum()  # 160 MB

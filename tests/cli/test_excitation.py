@@ -18,6 +18,7 @@ from ir_description import data_sheet, load_power_data
 from ir_recorder.measure import PowerModel
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cell", ["open", pytest.param("demo", marks=pytest.mark.long)])
 def test_every_movement_is_certified_and_begins_where_the_one_before_ended(
     cell: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -38,6 +38,7 @@ def test_the_program_plans(more: float, tmp_path: Path) -> None:
     assert planner.plan_program().status.ok
 
 
+@pytest.mark.long
 def test_what_lacks_is_told_where_no_layout_plans(tmp_path: Path) -> None:
     robot = thick_wrist(load_robot("kr210_r2700_extra"), 1.0)
     text, lacking = planned_text(tmp_path / "cell.yaml", "kr210_r2700_extra", robot)

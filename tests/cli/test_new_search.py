@@ -71,6 +71,7 @@ def running(site: Path, *words: str) -> Iterator[None]:
             process.kill()
 
 
+@pytest.mark.long
 def test_it_plans_by_its_name_and_says_whose_it_is(site: Path) -> None:
     words = ("-m", "ir_cli.main", "ask", "move", "demo", "home", "park", "--json")
     answer = run(site, *words, "--planner", NAME)

@@ -52,6 +52,7 @@ def assert_planned_figures_are_those_of_the_answer(analysis: Analysis, raw: RawR
     assert page.count(f"<b>{joules(steps[0].report.energy)}</b>") >= 2
 
 
+@pytest.mark.long
 def test_a_plan_that_was_never_driven_is_recorded_and_planned_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -61,6 +61,7 @@ def made(first: Path, tmp_path: Path) -> Path:
     return Path(shutil.copy(first, tmp_path))
 
 
+@pytest.mark.long
 def test_a_robot_made_from_a_urdf_moves_and_weighs_as_the_urdf_says(made: Path) -> None:
     robot = robot_named(str(made))
     original = load_robot("ur10e")

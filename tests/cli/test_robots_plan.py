@@ -11,6 +11,7 @@ import ir_description
 from ir_cli.main import main
 
 
+@pytest.mark.long
 def test_the_joint_cycle_is_printed_and_drawn(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

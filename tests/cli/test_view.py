@@ -244,6 +244,7 @@ def test_a_time_of_the_motion_has_its_step_power_and_nearest_pair(view: View) ->
     assert view.browser.state["hand"] is False
 
 
+@pytest.mark.long
 def test_it_is_compared_with_what_a_robot_does_today(view: View) -> None:
     view.planned()
     view.browser.press("compare")

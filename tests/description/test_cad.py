@@ -372,6 +372,7 @@ def test_a_mesh_is_named_in_a_file_and_is_a_regular_one(tmp_path: Path) -> None:
             solid_mesh.read_solid(tmp_path, name)
 
 
+@pytest.mark.long
 def test_a_mesh_of_very_many_triangles_is_simplified_and_all_of_it_is_contained(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -392,6 +393,7 @@ def test_a_mesh_of_very_many_triangles_is_simplified_and_all_of_it_is_contained(
         convex.convex_pieces(dense, 8)
 
 
+@pytest.mark.long
 def test_a_convex_solid_with_very_many_corners_is_one_piece_with_few() -> None:
     turn = np.linspace(0.0, 2.0 * np.pi, 250, endpoint=False)
     ring = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(250)])

@@ -415,6 +415,7 @@ def test_too_many_bodies_are_refused() -> None:
         cell_from_yaml(text)
 
 
+@pytest.mark.long
 def test_ten_thousand_zones_are_read() -> None:
     machines = "\n".join(
         f"  - {{name: m{i}, zone: {{kind: OPEN, size: [1, 1, 1], xyz: [0, 0, {i % 900}]}}, "

@@ -7,9 +7,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "krl.md"
 
 
+@pytest.mark.long
 def test_the_snippet_runs_without_ros() -> None:
     (snippet,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     code = f"import sys; sys.modules['rclpy'] = None\n{snippet}"

@@ -104,6 +104,7 @@ def test_an_export_costs_what_its_comments_say(demo: tuple[Planner, Any], style:
     check(planner, export_krl(planner, plan.movements, "visit", style=style))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_every_sequence_of_modes_comes_back(demo: tuple[Planner, Any], seed: int) -> None:
     planner, plan = demo

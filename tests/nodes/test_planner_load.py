@@ -177,6 +177,7 @@ def test_a_hundred_cancels_are_all_answered(
     assert answer.result().status == CANCELLED
 
 
+@pytest.mark.long
 def test_a_large_cell_holds_up_no_quick_request(
     planner_node: PlannerNode,
     ros_node: Any,

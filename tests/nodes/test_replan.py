@@ -106,6 +106,7 @@ def recording(
     return read_raw(tmp_path / "a.mcap")
 
 
+@pytest.mark.long
 def test_all_requests_are_planned_again_with_equal_ids_and_a_difference_is_named(
     recording: RawRecording,
 ) -> None:

@@ -157,6 +157,7 @@ def test_a_program_without_rests_costs_no_more_and_passes_all_stops(
     assert passed > 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["open", pytest.param("kr6_bench", marks=pytest.mark.long)])
 def test_a_cycle_takes_fewer_joules_and_may_be_shorter(name: str) -> None:
     cell, stops = drawn_cell(name, 5, 2)
@@ -246,7 +247,7 @@ def test_contacts_of_one_station_hold_in_a_joined_movement() -> None:
     assert joined > 0
 
 
-@pytest.mark.parametrize("style", ["spline", "kss8"])
+@pytest.mark.parametrize("style", ["spline", pytest.param("kss8", marks=pytest.mark.long)])
 def test_a_passed_stop_is_written_as_krl_and_driven_without_a_rest_there(style: str) -> None:
     cell, stops = drawn_cell("open", 2)
     planner = Planner(cell, clock=lambda: 0.0)

@@ -26,7 +26,10 @@ _ROUNDED = 2e-5  # m between two codes in penetration
 _INSTANTS = 300
 
 
-@pytest.fixture(scope="module", params=CELLS)
+@pytest.fixture(
+    scope="module",
+    params=[CELLS[0], *(pytest.param(cell, marks=pytest.mark.long) for cell in CELLS[1:])],
+)
 def planner(request: pytest.FixtureRequest) -> Planner:
     return Planner(request.param, clock=lambda: 0.0)
 

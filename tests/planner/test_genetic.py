@@ -309,6 +309,7 @@ def caged(budget: Work, degrees: Any, options: PlanOptions) -> Any:
     return planned(home, across, scene, replace(options, planner_id="genetic"), budget)
 
 
+@pytest.mark.long
 def test_a_failure_says_how_near_it_came_and_which_pair_blocks(
     degrees: Any, options: PlanOptions
 ) -> None:

@@ -47,6 +47,7 @@ def test_joints_beyond_the_fifth_stay_where_the_straight_segment_has_them() -> N
         assert set(np.round(path[1:-1, 5], 9)) <= {0.1, 0.2, 0.3}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "cell", ["table_columns", pytest.param("deep_box", marks=pytest.mark.long)]
 )
@@ -66,6 +67,7 @@ def test_the_seed_makes_little_difference(cell: str, scene_of: SceneOf) -> None:
         assert max(costs) <= (1.0 + SPREAD) * min(costs), task.name
 
 
+@pytest.mark.long
 def test_straight_steps_along_a_free_curve_are_free(scene_of: SceneOf) -> None:
     scene = scene_of("open")
     work = Work(400_000, 1.0, lambda: 0.0)

@@ -36,7 +36,10 @@ _NEARLY = 1.15
 
 @pytest.fixture(
     scope="module",
-    params=[pytest.param("open", marks=pytest.mark.long), "table_columns", "kr6_bench"],
+    params=[
+        *(pytest.param(cell, marks=pytest.mark.long) for cell in ("open", "table_columns")),
+        "kr6_bench",
+    ],
 )
 def planner(request: pytest.FixtureRequest) -> Planner:
     return Planner(request.param, clock=lambda: 0.0)

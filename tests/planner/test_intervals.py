@@ -215,6 +215,7 @@ def test_an_interval_holds_the_energy_that_it_is_of(energy: float, added: FloatA
     assert within.low <= energy <= within.high
 
 
+@pytest.mark.long
 def test_every_answer_lies_within_its_own_interval() -> None:
     asked = planner()
     cell = asked.cell

@@ -95,7 +95,9 @@ def judge(cycle: JointCycle, works: list[ArmWork], zones: list[ExclusiveZone]) -
     return joules
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(
+    "seed", [*range(2), *(pytest.param(seed, marks=pytest.mark.long) for seed in range(2, 6))]
+)
 @pytest.mark.parametrize("robots", [2, 3])
 def test_schedules_keep_their_zones_and_cost_what_they_say(seed: int, robots: int) -> None:
     works, zones = drawn(seed, robots)
@@ -239,7 +241,7 @@ def least_of_order(
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.long) for k in (1, 2, 3))])
-@pytest.mark.parametrize("factor", [1.001, 1.4])
+@pytest.mark.parametrize("factor", [1.001, pytest.param(1.4, marks=pytest.mark.long)])
 def test_brute_force_over_orders_and_modes_agrees(seed: int, factor: float) -> None:
     rng = np.random.default_rng([seed, 11])
     works = [drawn_work(rng, 2), drawn_work(rng, 3)]

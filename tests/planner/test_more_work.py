@@ -31,6 +31,7 @@ def asked(cell: str) -> tuple[Planner, tuple[str, ...], float]:
     return planner, stops, fastest.report.duration
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("cell", "longer"), [("demo", 1.5)])
 def test_more_work_never_refuses_and_never_costs_more(cell: str, longer: float) -> None:
     keeps_its_answers(cell, longer)
@@ -99,6 +100,7 @@ def keeps_its_budgets(cell: str, seed: int, count: int) -> None:
         found |= plan.status.ok
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("cell", "seed"), [("cnc_door", 2)])
 def test_own_laws_of_the_joints_make_no_program_slower(cell: str, seed: int) -> None:
     no_slower_with_own_laws(cell, seed)
@@ -156,6 +158,7 @@ def cost(plan: ProgramPlan, options: PlanOptions, longer: float) -> float:
     return sum(r.energy - r.base_energy + options.time_value * r.duration for r in reports)
 
 
+@pytest.mark.long
 def test_a_program_is_planned_with_little_work_and_takes_no_more_than_allowed() -> None:
     """Service lines, known without any work, leave it to the movements and the searches of
     stations.

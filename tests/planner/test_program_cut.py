@@ -8,6 +8,7 @@ import contextlib
 import itertools
 
 import numpy as np
+import pytest
 
 from ir_msgs_py.options import PlanOptions
 from ir_planner import CancelledError, Planner, ProgramPlan
@@ -48,6 +49,7 @@ def test_a_program_without_time_is_made_of_straight_segments() -> None:
     assert plan.info.iterations < 20_000
 
 
+@pytest.mark.long
 def test_time_that_ends_during_savings_or_front_cuts_them() -> None:
     whole, asked = planned(NEVER, savings=True, front_points=4)
     assert not whole.info.truncated

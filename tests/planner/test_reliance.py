@@ -24,6 +24,7 @@ def program():
     return plan.movements, planner.scene()
 
 
+@pytest.mark.long
 def test_a_movement_relies_on_the_door_where_it_comes_too_near_to_the_closed_one(program):
     movements, shut = program
     relied = []

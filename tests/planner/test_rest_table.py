@@ -216,6 +216,7 @@ def test_without_a_table_the_answer_is_as_ever_and_says_so() -> None:
     )
 
 
+@pytest.mark.long
 def test_a_program_that_rests_beyond_the_table_says_where() -> None:
     row = RestRow(tuple((HOME + 0.1).tolist()), 500.0, (200.0, 100.0, 50.0))
     power = replace(POWER, rest_table=RestTable(SAVING, (row,)))

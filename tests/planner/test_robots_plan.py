@@ -235,6 +235,7 @@ def test_what_makes_no_sense_is_refused_by_a_sentence(case: str, tmp_path: Path)
         planned(cells_of(tmp_path, text))
 
 
+@pytest.mark.long
 def test_a_robot_in_the_way_wherever_it_waits_is_said(tmp_path: Path) -> None:
     near = TEXT.replace("home_deg: [45, -125, 120, 0, 80, 0]", "home_deg: [0, -60, 60, 0, 60, 0]")
     with pytest.raises(RequestError, match="waiting place"):

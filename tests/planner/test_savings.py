@@ -150,6 +150,7 @@ def test_in_a_longer_cycle_both_programs_wait(
     assert "the common program waits 40.00 s at its end" in savings.sentence
 
 
+@pytest.mark.long
 def test_a_cycle_that_the_common_program_cannot_keep_is_compared_in_its_own_time(
     planned: Callable[[float], ProgramPlan], common: CommonProgram
 ) -> None:

@@ -134,6 +134,7 @@ def searching(monkeypatch: pytest.MonkeyPatch) -> Event:
     return begun
 
 
+@pytest.mark.long
 def test_the_search_for_a_cycle_ends_on_request(searching: Event) -> None:
     with pytest.raises(CancelledError):
         steady(CELL, parts_per_hour=30.0, cancelled=searching.is_set)
@@ -439,6 +440,7 @@ def with_buffer(*, at_will: bool) -> Cell:
     return replace(cell, route=replace(route, by_states=True)) if at_will else cell
 
 
+@pytest.mark.long
 def test_a_buffer_is_used_where_that_pays_and_parts_go_through_it() -> None:
     forced = steady(with_buffer(at_will=False), parts_per_hour=30.0, cycles=2)
     chosen = steady(with_buffer(at_will=True), parts_per_hour=30.0)
@@ -460,6 +462,7 @@ def test_a_buffer_is_used_where_that_pays_and_parts_go_through_it() -> None:
     ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["gauge", "washer"])
 def test_a_way_by_states_goes_without_a_machine_that_is_switched_off(name: str) -> None:
     cell = without(with_buffer(at_will=True), name)

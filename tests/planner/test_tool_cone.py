@@ -91,7 +91,9 @@ def cost(plan: MovementPlan, planner: Planner) -> float:
     return report.energy - report.base_energy + planner.cell.robot.time_value * report.duration
 
 
-@pytest.mark.parametrize("cell", CELLS)
+@pytest.mark.parametrize(
+    "cell", [CELLS[0], *(pytest.param(cell, marks=pytest.mark.long) for cell in CELLS[1:])]
+)
 @pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.long), 1])
 def test_the_tool_leans_no_farther_than_asked(cell: str, seed: int) -> None:
     planner = planner_in(cell)

@@ -98,6 +98,7 @@ def test_the_tcp_passes_within_a_distance(planners: dict[str, Planner]) -> None:
     assert away.min() <= 0.02 + 1e-4
 
 
+@pytest.mark.long
 def test_a_requested_duration_is_kept_or_refused_with_the_shortest(
     planners: dict[str, Planner],
 ) -> None:

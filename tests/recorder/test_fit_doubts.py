@@ -100,6 +100,7 @@ CORRUPTIONS = {
 SEEDS = [1, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(2, 6))]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_drawn_robot_that_is_recorded_well_is_not_doubted(seed: int) -> None:
     assert doubted(drawn_meter(seed)) == ""
@@ -168,6 +169,7 @@ def test_a_joint_whose_zero_is_elsewhere_is_named_by_the_watts(
     assert f"added to {robot.joint_names[joint]}" in said
 
 
+@pytest.mark.long
 def test_a_meter_of_two_phases_of_three_is_told_or_may_be_one() -> None:
     model, prior = model_of(ROBOT, centres=True)
     samples = moved(ROBOT, 1)

@@ -224,6 +224,7 @@ def contents_of(path: Path) -> object:
     return channels, {(each.name, each.data) for each in raw.attachments}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("chunks", [2, pytest.param(20, marks=pytest.mark.long)])
 def test_bombs_stay_within_memory_and_time(chunks: int, tmp_path: Path) -> None:
     found = judged(bombs(chunks), tmp_path)

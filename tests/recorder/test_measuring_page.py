@@ -75,6 +75,7 @@ def test_the_commands_of_the_page_lead_from_a_programme_to_a_plan(
     assert "press_line_2" in capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_what_a_plant_showed_is_a_trace_with_modes_and_loads(folder: Path) -> None:
     (trace,) = read_traces(folder / "run.csv")
     assert set(trace.texts["load"]) == {"gripper", "gripper+gear"}

@@ -57,7 +57,7 @@ PAGES: tuple[Callable[[Analysis, Costs], str], ...] = (report, recordings, fleet
 
 @pytest.mark.parametrize(
     "made",
-    [report, fleet, *(pytest.param(made, marks=pytest.mark.long) for made in (recordings, robots))],
+    [fleet, *(pytest.param(made, marks=pytest.mark.long) for made in (report, recordings, robots))],
 )
 def test_a_typed_price_says_what_a_page_of_that_price_says(
     browser: Any, analysis: Analysis, tmp_path: Path, made: Callable[[Analysis, Costs], str]
@@ -160,7 +160,9 @@ def mixed(analysis: Analysis, costs: Costs) -> str:
     return fleet_html([member, undriven(member, "second")], costs=costs)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 4))]
+)
 @pytest.mark.parametrize("made", [report, fleet, mixed])
 def test_what_is_reached_and_what_is_left_are_the_differences_of_the_bars(
     analysis: Analysis,

@@ -76,6 +76,7 @@ def test_a_message_from_the_far_future_costs_only_itself(tmp_path: Path) -> None
     assert "2 messages have a time after the year 2260" in raw.problems
 
 
+@pytest.mark.long
 def test_mutilated_recordings_are_read_or_refused(short_file: Path, tmp_path: Path) -> None:
     """Bytes changed, dropped and put in at random: a page, or a sentence."""
     generator = np.random.default_rng(0)

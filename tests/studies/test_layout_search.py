@@ -92,6 +92,7 @@ def test_more_placements_are_added_to_a_folder_and_other_budgets_refused(laid: L
         laid(replace(SPREAD, time_value=100.0))
 
 
+@pytest.mark.long
 def test_a_given_placement_that_hangs_is_cut_and_said(laid: Laid) -> None:
     found = laid(replace(SPREAD, placements=40, hang_after=2.0), "out", "hang")
     assert found.known[0].reason == ("cut", "no answer within 2 s")
@@ -152,6 +153,7 @@ except StudyError as error:
 """
 
 
+@pytest.mark.long
 def test_a_full_disk_ends_it_with_a_sentence_and_it_goes_on_when_there_is_room(
     laid: Laid, tmp_path: Path
 ) -> None:

@@ -197,6 +197,7 @@ def run(monkeypatch: pytest.MonkeyPatch, folder: Path, *words: str) -> None:
     paper.main()
 
 
+@pytest.mark.long
 def test_a_claim_is_measured_stored_and_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -45,6 +45,7 @@ for line in sys.stdin:
 """
 
 
+@pytest.mark.long
 def test_a_worker_that_hangs_ends_with_a_study_that_was_killed(
     tmp_path: Path, wait_for: Any
 ) -> None:

@@ -237,6 +237,7 @@ def study_of_a_pair(tmp_path_factory: pytest.TempPathFactory) -> StudyOfAPair:
     return StudyOfAPair(study, folder, answer, row, heard)
 
 
+@pytest.mark.long
 def test_a_pair_is_planned_driven_and_measured_in_two_ways(study_of_a_pair: StudyOfAPair) -> None:
     row = study_of_a_pair.row
     for timing in ("synchronous", "asynchronous"):

@@ -69,6 +69,7 @@ def test_every_part_needs_what_was_planned() -> None:
     assert [span.seconds for span in gauge.working] == pytest.approx([12.0] * 2, abs=0.02)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("process", "capacity", "buffer", "cycles"),
     [

@@ -71,6 +71,7 @@ def test_the_readme_names_the_two_commands_and_starts_the_nodes_first() -> None:
     assert len(commands()) >= 14
 
 
+@pytest.mark.long
 def test_what_needs_no_ros_runs_before_anything_is_started(tmp_path: Path) -> None:
     for line in commands()[: len(blocks("bash")[0].splitlines())]:
         done = shell(line, tmp_path)

@@ -76,6 +76,7 @@ def own(raw: RawRecording, topic: str, message_type: Any) -> list[Any]:
     )
 
 
+@pytest.mark.long
 def test_two_cells_in_one_domain_keep_to_themselves(
     up: Any, ros_domain_id: int, wait_for: Any, tmp_path: Path
 ) -> None:
