@@ -38,6 +38,19 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
 
 
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Keep the first and the last case of each `sampled` test, where long tests are left out."""
+    if config.option.markexpr != "not long":
+        return
+    cases: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        if item.get_closest_marker("sampled") and not item.get_closest_marker("long"):
+            cases.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    left = {id(item) for each in cases.values() for item in each[1:-1]}
+    config.hook.pytest_deselected(items=[item for item in items if id(item) in left])
+    items[:] = [item for item in items if id(item) not in left]
+
+
 def pytest_collection_finish() -> None:
     """What was collected lives as long as the session: the garbage collector need not walk it."""
     gc.collect()

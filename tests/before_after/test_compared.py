@@ -103,6 +103,7 @@ def test_changes_are_the_largest_savings_and_the_least_work_comes_first(
     assert "1 stop less" in passed.words
 
 
+@pytest.mark.long
 def test_the_common_program_saves_what_the_planner_says(
     planned: ProgramPlan, common: BeforeAfter
 ) -> None:

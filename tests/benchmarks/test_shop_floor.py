@@ -30,6 +30,7 @@ def test_a_drawn_cell_comes_back_in_every_style(seed: int) -> None:
         assert row.loads_off + row.modes_off + row.contacts_off == 0, row
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", range(1000, 1040))
 def test_what_is_known_of_a_program_is_read(seed: int) -> None:
     row = row_of(seed)

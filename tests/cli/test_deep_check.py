@@ -62,6 +62,7 @@ def check_planned(document: Document, seed: int) -> None:
     assert plan.status.ok, plan.status.message
 
 
+@pytest.mark.long
 @settings(max_examples=2, deadline=None, derandomize=True)
 @given(document=broken_documents(), seed=st.integers(1, 1000))
 def test_what_the_check_calls_fine_is_planned(document: Document, seed: int) -> None:
@@ -85,6 +86,7 @@ def changed(cell: Cell, name: str, **fields: object) -> Cell:
     return replace(cell, stations=stations)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("name", "missing"),
     [("infeed_pick", {"allowed_contacts": ()}), ("gauge_measure", {"approach_distance": 0.0}),

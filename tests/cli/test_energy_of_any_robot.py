@@ -99,6 +99,7 @@ def written(folder: Path, robot: RobotModel, standing: float) -> tuple[Path, Pat
     return log, mapping
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("by", ["meter", "motors"])
 def test_a_log_is_fitted_and_planned_with(
     cell: str, by: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

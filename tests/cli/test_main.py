@@ -51,6 +51,7 @@ def test_a_domain_that_is_none_is_a_sentence(
     assert f"ROS_DOMAIN_ID is '{domain}': it must be a whole number 0 .. 232" in said
 
 
+@pytest.mark.long
 def test_a_process_of_such_a_domain_ends_without_a_traceback() -> None:
     ended = ir("ros", "list", ROS_DOMAIN_ID="233")
     assert ended.returncode == 1

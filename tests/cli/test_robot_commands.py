@@ -200,6 +200,7 @@ def test_seven_axes_are_refused_with_their_names(
     assert "has 7 axes (shoulder_pan_joint, " in capsys.readouterr().err
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", range(8))
 def test_a_planned_axis_that_others_follow_turns_as_the_urdf_says_and_never_farther(
     seed: int,

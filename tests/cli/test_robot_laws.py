@@ -249,6 +249,7 @@ def test_shapes_meet_in_no_allowed_posture_but_where_they_are_built_so(
     assert not good, line
 
 
+@pytest.mark.long
 def test_links_that_lie_in_each_other_but_never_meet_keep_their_postures(tmp_path: Path) -> None:
     """A ball of link 4 around the middle of the wrist, and 12 mm outside of it half a shell of link
     6: their capsules overlap in every posture.

@@ -98,6 +98,7 @@ def test_a_parameter_that_no_node_takes_is_a_sentence(text: str, sentence: str) 
     assert sentence in str(refused.value)
 
 
+@pytest.mark.long
 def test_every_default_is_a_value_that_may_be_given() -> None:
     for node in ("ir_planner", "ir_sim_driver", "ir_program_runner", "ir_recorder"):
         for name, setting in parameters_of(node).items():

@@ -130,6 +130,7 @@ def test_the_cell_is_drawn_checked_and_planned(view: View) -> None:
     assert [joint["name"] for joint in scene["joints"]] == list(view.stage.cell.robot.joint_names)
 
 
+@pytest.mark.long
 def test_a_saved_file_is_shown_and_one_with_errors_keeps_the_last_cell(
     view: View, path: Path
 ) -> None:
@@ -296,6 +297,7 @@ def test_what_no_control_sends_is_refused(view: View, name: str, value: Any, sta
     assert not answer.get("done")
 
 
+@pytest.mark.long
 def test_a_recording_is_replayed_and_its_cell_planned(tmp_path: Path) -> None:
     planned = tmp_path / "plan.mcap"
     path = tmp_path / "small.yaml"
@@ -384,6 +386,7 @@ def test_a_taken_port_is_refused_and_two_views_stand_side_by_side(
     assert capsys.readouterr().out.startswith("http://127.0.0.1:")
 
 
+@pytest.mark.long
 def test_ctrl_c_ends_it_and_what_it_plans() -> None:
     process = subprocess.Popen(
         [sys.executable, "-m", "ir_cli.main", "view", "demo", "--port", "0"],

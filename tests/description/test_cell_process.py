@@ -86,6 +86,7 @@ def test_errors_can_be_sent_to_another_process(error: DescriptionError) -> None:
     assert str(back) == str(error)
 
 
+@pytest.mark.long
 def test_meshes_are_bounded_together() -> None:
     rng = np.random.default_rng(1)
     points = rng.normal(size=(1000, 3))

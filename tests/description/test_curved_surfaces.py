@@ -158,6 +158,7 @@ def test_a_point_is_as_far_from_a_triangle_as_from_its_nearest_point() -> None:
     assert (found >= nearest - longest / 16.0).all()
 
 
+@pytest.mark.long
 def test_the_pieces_of_a_cell_contain_the_curved_solid(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -189,6 +190,7 @@ def test_without_cascadio_the_sentence_names_it(monkeypatch: pytest.MonkeyPatch)
         triangles_of_surfaces(b"", ".step")
 
 
+@pytest.mark.long
 def test_an_import_says_that_the_triangles_of_curved_surfaces_are_not_proved(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -140,6 +140,7 @@ def test_what_does_not_matter_is_no_reason_to_refuse_a_file() -> None:
         urdf_arm(macro, "arm.urdf")
 
 
+@pytest.mark.long
 def test_an_argument_that_a_xacro_file_does_not_have_is_refused_with_those_it_has(
     tmp_path: Path,
 ) -> None:

@@ -125,6 +125,7 @@ def test_envelope_and_friction_are_those_of_the_kernels(cell, make):
     assert np.allclose(mine[fast], resistance[fast], atol=1e-6)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("backend_name", ["pybullet", "ideal"])
 @pytest.mark.parametrize(("load", "payload"), [("cell", 155.0), ("none", 0.0)])
 @pytest.mark.parametrize(

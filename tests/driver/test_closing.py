@@ -46,6 +46,7 @@ def at_home(simulation, signs, size):
     return home, home + size * np.array(signs)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("load", ["none", "cell", "gripper+gear"])
 @pytest.mark.parametrize("size", [1e-9, 1e-6, 1e-3, 0.0099])
 def test_at_home_every_direction_of_the_difference_is_closed(loaded, plan, load, size):

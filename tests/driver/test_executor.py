@@ -227,6 +227,7 @@ def test_a_hundred_replacements_a_second_end_each_goal_once(make, plan, start, h
 BOUND = np.array([600.0, 600.0, 600.0, 100.0, 100.0, 100.0])  # Nm, of docs/driver.md
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("load", ["none", "gripper"])
 @pytest.mark.parametrize("seed", range(3))
 def test_up_to_the_bound_a_disturbed_tool_stays_within_two_millimetres(load, seed, start, run_out):

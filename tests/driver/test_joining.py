@@ -42,6 +42,7 @@ def commands(simulation, steps: int) -> FloatArray:
     return np.array(found)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("scaling", [1.0, 0.6])
 @pytest.mark.parametrize("stamped", [False, True])
@@ -92,6 +93,7 @@ def test_what_begins_beside_the_movement_or_behind_is_not_joined(make, start, ce
     assert simulation.executor.active
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", range(8))
 def test_a_stop_at_any_moment_ends_the_movement_and_what_joins_it(make, start, cell, seed):
     """Nothing moves between the stop and the recovery nor for longer than both would take after

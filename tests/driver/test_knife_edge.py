@@ -62,6 +62,7 @@ def turned(joint, by=0.1):
     return q
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("held", HELD)
 @pytest.mark.parametrize("size", [1e-11, 1e-9, 1e-6, 9e-6])
 def test_a_joint_that_may_rest_where_friction_is_too_much_for_it_does_not_keep_others_from_moving(

@@ -144,6 +144,7 @@ def bench(make):
     return at
 
 
+@pytest.mark.sampled
 @every_way
 def test_end_pause_says_when_the_motors_are_on_or_that_they_stay_off(bench, way):
     here = bench(*way)
@@ -163,6 +164,7 @@ def test_end_pause_says_when_the_motors_are_on_or_that_they_stay_off(bench, way)
     assert here.state == "STAND_ON_MOTORS"
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("pause", [0.5, LONG])
 @every_way
 def test_start_pause_ends_in_the_mode_that_it_answers_or_changes_nothing(bench, way, pause):
@@ -182,6 +184,7 @@ def test_start_pause_ends_in_the_mode_that_it_answers_or_changes_nothing(bench, 
     assert pause < LONG or promised is Mode.HIBERNATION
 
 
+@pytest.mark.sampled
 @every_way
 def test_query_modes_tells_the_times_and_changes_nothing(bench, way):
     here = bench(*way)

@@ -80,6 +80,7 @@ def close(measured: float, planned: float) -> None:
     assert abs(measured - planned) <= max(JOULES, SHARE * planned), (measured, planned)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     "seed", [*range(6), *(pytest.param(seed, marks=pytest.mark.long) for seed in range(6, 24))]
 )
@@ -103,6 +104,7 @@ def test_a_pause_of_known_length_costs_what_was_planned(seed: int) -> None:
     close(plant.mains.energy() - begun, planned.energy)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     "seed",
     [*range(24, 34), *(pytest.param(seed, marks=pytest.mark.long) for seed in range(34, 60))],

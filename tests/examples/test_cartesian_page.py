@@ -7,9 +7,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "cartesian.md"
 
 
+@pytest.mark.long
 def test_the_snippets_run_without_ros() -> None:
     snippets = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     code = "\n".join(["import sys; sys.modules['rclpy'] = None", *snippets])

@@ -341,6 +341,7 @@ def test_thirty_hostile_requests_to_the_physics_break_no_law() -> None:
     assert attacked(30, seed=2, backend="pybullet")[1] == []
 
 
+@pytest.mark.long
 def test_hostile_requests_among_machines_break_no_law() -> None:
     """Contacts and machines that close are part of it."""
     done, wrong = attacked(100, seed=3, cell="demo")

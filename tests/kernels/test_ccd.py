@@ -86,6 +86,7 @@ def test_psi_is_eq_2_and_never_grows(core: Any) -> None:
         before = result.psi
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("newton_steps", [0, 20])
 def test_compiled_core_walks_like_the_reference(core: Any, newton_steps: int) -> None:
     robot = kr210()

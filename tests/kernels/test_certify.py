@@ -142,6 +142,7 @@ def quintics(rng: np.random.Generator, count: int) -> tuple[FloatArray, FloatArr
     return coefficients, durations
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", range(12))
 def test_dense_samples_of_a_trajectory_contradict_no_verdict(seed: int) -> None:
     model = kr210(OPEN)

@@ -94,6 +94,7 @@ def test_extremes_of_rest_to_rest_are_the_textbook_ones() -> None:
     assert when[:5] == pytest.approx(1.0, abs=1e-6)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("duration", [2.0, 1.2, 1.0, 0.85])
 def test_bounds_enclose_a_fine_sampling_and_are_sharp(core: Any, duration: float) -> None:
     model = DynamicsModel(kr210(), (tool_155(),), core=core)

@@ -301,6 +301,7 @@ def test_gradients_of_distances_are_those_of_differences(bodies: tuple[Body, ...
     assert np.abs(slope[:, 0]).max() > 0.1
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("bodies", SCENES)
 def test_dense_samples_contradict_no_verdict(bodies: tuple[Body, ...]) -> None:
     model = collision_of(on_flat_ground(), bodies)
@@ -420,6 +421,7 @@ def test_power_is_torque_times_speed_and_losses_and_energy_closes(core: Any) -> 
     assert work == pytest.approx(lifted + friction - helped, rel=1e-6)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", ["kr210 with tool", "random 3", "coupled 6"])
 def test_the_cost_of_a_spline_and_its_derivatives_agree_with_the_reference(
     compiled_core: Any, name: str

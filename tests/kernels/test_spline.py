@@ -84,6 +84,7 @@ def by_definition(
     return cost + t.clearance_penalty * step * float((lacks**2).sum())
 
 
+@pytest.mark.sampled
 @every_build(
     "seed, regeneration", [(seed, how) for seed in range(3) for how in REGENERATIONS], few=3
 )
@@ -121,6 +122,7 @@ def test_the_cost_of_other_robots_is_what_it_says(core: Any, n: int, wrist: bool
     )
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("capacity", [0.0, 106.0, 5000.0])
 @pytest.mark.parametrize("regeneration", REGENERATIONS)
 def test_energy_is_that_of_the_drives(
@@ -233,6 +235,7 @@ def directions(core: Any) -> int:
     return 2 if core is None else 8
 
 
+@pytest.mark.sampled
 @every_build(
     "interval, seed, regeneration, smoothing",
     # every interval and smoothing with two regenerations and every regeneration with both of them
@@ -267,6 +270,7 @@ def test_derivatives_of_other_robots_are_those_of_differences(
     check_derivatives(cost, motion(n, 8, n), 0.2, np.zeros(5, int), n, directions(core))
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     "bodies", [COLUMNS, OPEN, (box("far", (60.0, 0.0, 0.0), (100.0, 1.0, 3.0)),), ()]
 )
@@ -293,6 +297,7 @@ def tilted(seed: int, most: float) -> dict[str, Any]:
     return {"tilt_axis": axis, "tilt_direction": direction, "tilt_max": most}
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("seed", "most"), [(0, 0.0), (1, 0.2), (2, 1.5), (3, 3.0)])
 def test_a_tilt_costs_the_square_of_its_excess_over_time(core: Any, seed: int, most: float) -> None:
     control = motion(seed, 9, around=WORKING)

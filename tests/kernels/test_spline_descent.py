@@ -83,6 +83,7 @@ def test_the_descent_lowers_the_cost_and_reports_it_truly(core: Any) -> None:
     assert last < 0.5 * cost.value(control, 0.15).value
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     "seed", [*range(4), *(pytest.param(seed, marks=pytest.mark.long) for seed in range(4, 8))]
 )
@@ -161,6 +162,7 @@ def test_it_ends_when_steps_gain_little(core: Any) -> None:
     assert hasty.value > patient.value
 
 
+@pytest.mark.long
 def test_compiled_descent_is_that_of_the_reference(
     compiled_core: Any, of_reference: list[SplineDescent]
 ) -> None:

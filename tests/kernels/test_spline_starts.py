@@ -77,6 +77,7 @@ def test_a_requested_duration_stays(compiled_core: Any) -> None:
         assert found.interval * (len(found.control) - 3) == pytest.approx(3.0)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("fixed", [False, True])
 def test_the_profile_along_a_path_is_that_of_the_reference(compiled_core: Any, fixed: bool) -> None:
     found, expected = (along_one(core, fixed) for core in (compiled_core, None))

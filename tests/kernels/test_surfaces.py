@@ -78,6 +78,7 @@ def test_surfaces_meet_where_coal_finds_them_so_near(seed: int, count: int) -> N
         assert one.touching(other, pose, near).any() == met[0]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", range(4))
 def test_the_compiled_core_finds_the_triangles_of_the_reference(
     compiled_core: Any, seed: int

@@ -58,6 +58,7 @@ def judged(chains: tuple[Chain, Chain], q: tuple[FloatArray, FloatArray]) -> flo
     )
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", range(6))
 def test_what_is_proved_free_is_free_at_drawn_pairs_of_instants(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -86,6 +87,7 @@ def share_of(seconds: FloatArray, time: float) -> float:
     return float(np.interp(time, begins, np.linspace(0.0, 1.0, len(begins))))
 
 
+@pytest.mark.long
 def test_the_order_of_arms_and_their_speed_change_nothing() -> None:
     rng = np.random.default_rng(11)
     chains = Chain(KR210), Chain(KR210, shift((2.6, 0.0, 0.0), np.pi))

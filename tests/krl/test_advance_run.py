@@ -57,6 +57,7 @@ def moving(planner: Planner, program: Followed) -> list[DrivenStep]:
     return [step for step in steps if step.moves]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("between", BETWEEN)
 def test_what_stops_the_advance_run_rounds_no_corner(
     between: str, planner: Planner, followed: Follow

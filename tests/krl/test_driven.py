@@ -204,7 +204,7 @@ def test_an_output_ends_an_approximation(planner: Planner, followed: Follow) -> 
 
 
 @given(st.integers(0, 10**9))
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=5, deadline=None)
 def test_what_is_driven_keeps_the_limits(planner: Planner, seed: int) -> None:
     """Law: what is driven keeps speed, acceleration, jerk and torque of every axis, blends
     included.
@@ -401,7 +401,7 @@ def test_a_corner_between_the_two_kinds_of_motions_is_an_exact_stop(
 
 
 @given(st.floats(0.1, 4.0), st.floats(0.1, 4.0), st.sampled_from([100.0, 7.0]))
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=5, deadline=None)
 def test_parts_of_a_spline_last_as_long_as_their_time_block_asks(
     planner: Planner, first: float, second: float, whole: float
 ) -> None:

@@ -129,6 +129,7 @@ def bench() -> Planner:
     return Planner("kr6_bench", clock=lambda: 0.0)
 
 
+@pytest.mark.long
 def test_a_path_of_the_tool_is_a_spline_at_its_speed(bench: Planner) -> None:
     cell = bench.cell
     path = replace(bench.cell.path("bead"), free_angle=0.0)
@@ -230,6 +231,7 @@ def test_the_commands_of_the_terminal(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "is there already" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_what_is_exported_is_what_was_planned_as_the_loop_goes_on(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

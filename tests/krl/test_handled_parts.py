@@ -228,6 +228,7 @@ def test_a_load_that_changes_on_the_way_is_costed_where_it_is_carried(
     assert any("carries what $LOAD says, movement by movement" in note for note in answer.notes)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", ["grip", "Grip", "IR_PAUSE", "ir_done"])
 @pytest.mark.parametrize("style", ["spline", "kss8"])
 def test_a_signal_that_the_program_has_itself_is_refused(

@@ -28,6 +28,7 @@ def expected(text: str, pattern: str) -> list[str]:
     return re.findall(pattern, text)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("path", PROGRAMS, ids=lambda path: path.stem)
 def test_a_program_does_what_its_comments_expect(path: Path, planner: Planner) -> None:
     cell = planner.cell

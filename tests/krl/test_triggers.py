@@ -375,6 +375,7 @@ def drawn(seed: int) -> tuple[str, str, list[tuple[int, bool]]]:
     return "\n".join(plain), "\n".join(lines), outputs
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", range(6))
 def test_triggers_change_no_motion(seed: int) -> None:
     """Law, on generated chains: with triggers the same motions, cut without a gap; everything is

@@ -232,6 +232,7 @@ def lead_in():
     return ExecuteTrajectory.Goal(trajectory=trajectory_to_msg(trajectory))
 
 
+@pytest.mark.long
 def test_a_hundred_times_faster_stamps_stay_on_the_grid_and_go_forward(
     client, clock, stamps, wait_for
 ):

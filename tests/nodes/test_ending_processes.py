@@ -72,6 +72,7 @@ EVERY = [
 ]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("name", "signals"),
     [*QUICK, *(pytest.param(*each, marks=pytest.mark.long) for each in EVERY if each not in QUICK)],

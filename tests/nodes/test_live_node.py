@@ -191,6 +191,7 @@ def command() -> Iterator[subprocess.Popen[str]]:
     process.communicate()
 
 
+@pytest.mark.long
 def test_the_command_prints_its_address_and_ends_well_while_somebody_watches(
     command: subprocess.Popen[str], wait_for: Any
 ) -> None:

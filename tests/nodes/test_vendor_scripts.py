@@ -213,6 +213,7 @@ SCRIPTS = [
 ]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: getattr(script, "__name__", None))
 def test_a_script_for_trajectory_controllers_runs(robot, script):
     script(robot)

@@ -33,6 +33,7 @@ def end_of(planner: Planner, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
     return np.asarray(plan.trajectory.positions[-1])
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("seed", "joint"), CASES)
 def test_a_robot_that_stands_a_little_beyond_a_limit_drives_back_and_there(
     planner: Planner, seed: int, joint: int
@@ -90,6 +91,7 @@ DOORS = {
 }
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("door", DOORS)
 @pytest.mark.parametrize("seed", range(8))
 def test_an_end_is_the_goal_that_was_asked_for(planner: Planner, door: str, seed: int) -> None:

@@ -196,6 +196,7 @@ def ends_at(plan: ProgramPlan, name: str) -> bool:
     )
 
 
+@pytest.mark.long
 def test_where_something_happens_the_robot_stands_still() -> None:
     cell, stops = drawn_cell("open", 2)
     middle = stops[1]

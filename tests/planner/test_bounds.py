@@ -49,6 +49,7 @@ def configurations(rng: np.random.Generator, count: int) -> np.ndarray:
     return np.ascontiguousarray(free[:count])
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(
     "rates", [Rates(1.0, 500.0), Rates(1.0, 5000.0), Rates(0.0, 1.0), Rates(1.0, 0.0)]

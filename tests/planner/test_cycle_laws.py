@@ -97,6 +97,7 @@ def test_energies_of_drawn_cycle_times_keep_the_law(cell: str) -> None:
         assert e1 <= (1.0 + LAW) * (e0 + wait), (t0, t1)
 
 
+@pytest.mark.long
 def test_a_movement_at_a_value_costs_no_more_than_known_ones_slowed(
     scene_of: Callable[[str], PlanningScene],
 ) -> None:

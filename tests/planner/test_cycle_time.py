@@ -243,6 +243,7 @@ def test_energy_over_cycle_time_keeps_the_law_of_waiting(
     assert planned(40.0 * free).movements[-1].power_mode == "STAND_ON_BRAKES>BUS_POWER_OFF"
 
 
+@pytest.mark.long
 def test_too_short_a_cycle_names_the_shortest(planned: Callable[[float], ProgramPlan]) -> None:
     with pytest.raises(RequestError, match="the shortest is") as refused:
         planned(1.0)

@@ -95,6 +95,7 @@ def test_an_end_in_a_closed_room_is_recognised(
     assert found.needed == pytest.approx(S_M, abs=1e-5)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("missing", SIDES)
 def test_a_room_without_a_wall_encloses_nothing(
     scene_of: SceneOf, missing: tuple[int, float]

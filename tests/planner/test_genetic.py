@@ -72,6 +72,7 @@ def clearance(path: FloatArray, scene: PlanningScene) -> float:
     return smallest
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("cell", "task", "flip"), TASKS)
 @pytest.mark.parametrize(
     "seeds", [range(1), pytest.param(range(1, 30), marks=pytest.mark.long)], ids=str
@@ -323,6 +324,7 @@ def test_a_failure_says_how_near_it_came_and_which_pair_blocks(
     assert plan.info.iterations > generations
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("most", [1, 2, 5, 50, 100, 300, 1000, 3333])
 def test_work_is_charged_and_never_more_than_there_is(
     most: int, degrees: Any, options: PlanOptions

@@ -138,6 +138,7 @@ def test_what_collided_before_the_step_is_not_set_back() -> None:
     assert share[0] == 0.0
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("set_back", [SECANT, PRINTED, GAIN, NONE])
 @pytest.mark.parametrize(
     ("cell", "station"), [("cnc_door", "cncL"), ("deep_box", "bin"), ("deep_box", "tun")]
@@ -292,6 +293,7 @@ def replayed(
     return float(q[1]), 3
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("at_a_limit", [False, True])
 @pytest.mark.parametrize("reading", [SECANT, PRINTED, GAIN])
 def test_a_step_that_collides_is_set_back_twice_at_most_and_else_taken_back(

@@ -57,6 +57,7 @@ def with_value(name: str, value: float) -> PowerParameters:
     return replace(SHEET, mean=mean)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("task", ["home->p1", "conv->p1", "p1b->cab"])
 def test_the_interval_is_that_of_robots_computed_one_by_one(task: str) -> None:
     trajectory = movement(task)

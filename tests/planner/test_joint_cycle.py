@@ -95,6 +95,7 @@ def judge(cycle: JointCycle, works: list[ArmWork], zones: list[ExclusiveZone]) -
     return joules
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     "seed", [*range(2), *(pytest.param(seed, marks=pytest.mark.long) for seed in range(2, 6))]
 )
@@ -120,6 +121,7 @@ def test_without_a_zone_robots_cost_the_sum_of_both(seed: int) -> None:
     assert cheapest(works, [], period).joules == pytest.approx(sum(alone), rel=1e-6)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", range(4))
 def test_a_zone_never_makes_a_cycle_cheaper_and_the_order_of_robots_says_nothing(seed: int) -> None:
     works, zones = drawn(seed)

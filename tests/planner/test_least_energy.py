@@ -102,6 +102,7 @@ def test_short_movements_cost_little_more_than_the_best_known(
         assert drives(report) < NEAR_THE_BEST * joules
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("cell", "seed"),
     [
@@ -127,6 +128,7 @@ def test_no_answer_costs_more_than_a_shorter_one_stretched(
         assert longer.report.energy <= energy * (1.0 + 1e-6)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("cell", "seed"),
     [
@@ -148,6 +150,7 @@ def test_no_duration_takes_less_than_the_least_energy(
         assert drives(least) <= SHALLOW * drives(other)
 
 
+@pytest.mark.long
 def test_a_longer_cycle_with_the_wait_at_its_end_is_filled_with_the_least_energy(
     demo_cell: Cell,
 ) -> None:
@@ -171,6 +174,7 @@ def test_time_is_the_fastest_that_any_objective_finds(
         assert asked(q0, q1, scene, objective=objective).report.duration >= fastest
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("cell", "seed"),
     [

@@ -21,7 +21,7 @@ level = st.lists(st.floats(0.3, 12.0), min_size=LEVELS, max_size=LEVELS)
 
 
 @given(st.floats(0.2, 3.0), level, level, st.floats(20.0, 400.0))
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=40)
 def test_a_law_of_levels_arrives_at_rest_and_integrates(
     speed: float, up: list[float], down: list[float], jerk: float
 ) -> None:

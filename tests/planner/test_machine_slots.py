@@ -185,6 +185,7 @@ def test_parts_go_through_slots_in_turn_and_none_is_taken_too_soon(
             assert last == pytest.approx(cycle.period, abs=ROUNDING * len(cycle.visits))
 
 
+@pytest.mark.long
 @settings(max_examples=3, deadline=None)
 @given(
     seed=st.integers(0, 10_000),

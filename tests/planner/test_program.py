@@ -50,6 +50,7 @@ def demo(demo_cell: Cell, power: PowerData) -> ProgramPlan:
     return plan
 
 
+@pytest.mark.long
 def test_an_answer_names_its_timing(demo: ProgramPlan, demo_cell: Cell, power: PowerData) -> None:
     assert demo.info.timing == "synchronous"
     alone = {

@@ -38,6 +38,7 @@ def clearance_along(trajectory: Any, scene: PlanningScene, step: float = 5e-4) -
     )
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("cell", "task", "flip"), TASKS)
 def test_every_task_of_the_open_cells_is_solved_and_certified(
     cell: str, task: str, flip: bool, scene_of: SceneOf, budget: Work, options: PlanOptions

@@ -72,6 +72,7 @@ def nearest(plan: RobotsPlan, cells: RobotCells, seed: int, delay: float) -> flo
     return judge.least(driven(plan, np.random.default_rng(seed), 2, delay=delay), MARGIN)[0]
 
 
+@pytest.mark.long
 def test_two_robots_share_a_table_in_turns(plan: RobotsPlan) -> None:
     assert plan.certified
     (zone,) = plan.zones

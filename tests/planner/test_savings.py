@@ -137,6 +137,7 @@ def test_both_programs_last_equally_long_and_the_planned_one_costs_less(
     assert f"the common program's {seconds:.2f} s" in savings.sentence
 
 
+@pytest.mark.long
 def test_in_a_longer_cycle_both_programs_wait(
     planned: Callable[[float], ProgramPlan], common: CommonProgram
 ) -> None:

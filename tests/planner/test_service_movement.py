@@ -481,6 +481,7 @@ def test_every_candidate_of_the_search_is_kept_or_has_a_reason(scene_of: SceneOf
 # -- the whole movement
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("direction", ["exit", "entry"])
 @pytest.mark.parametrize(
     ("cell", "station"), [("cnc_door", "cncL"), ("deep_box", "tun"), ("demo", "infeed_pick")]

@@ -86,6 +86,7 @@ def test_what_is_no_pause_is_refused(pause: float) -> None:
 TIMER = POWER.motors_to_brakes_in_program
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("pause", [1.0, TIMER - 0.5, TIMER + 0.1, TIMER + 0.8, TIMER + 5.0, 60.0])
 def test_a_pause_that_the_controller_is_left_to_costs_what_the_driver_measures(
     pause: float,

@@ -70,6 +70,7 @@ def faults(problem: SteadyProblem, cycle: SteadyCycle) -> list[str]:
     return found
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("machines", "seed"),
     [

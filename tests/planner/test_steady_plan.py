@@ -345,6 +345,7 @@ def test_the_page_s_figures_are_those_that_are_planned() -> None:
         assert figure in text
 
 
+@pytest.mark.long
 def test_the_cycle_is_written_as_a_cell_that_is_planned_as_a_program() -> None:
     plan = at_thirty()
     assert plan.cell is not None
@@ -366,6 +367,7 @@ def routed(cell: Cell, visits: tuple[str, ...]) -> Cell:
     return replace(cell, equipment=machines, route=replace(cell.route, visits=visits))
 
 
+@pytest.mark.long
 def test_one_machine_alone_is_tended_too() -> None:
     cell = routed(CELL, ("infeed_pick", "gauge_seat", "outfeed_place"))
     plan = steady(cell)
@@ -374,6 +376,7 @@ def test_one_machine_alone_is_tended_too() -> None:
     assert plan.cycle.period >= 12.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("over", [pytest.param(1.05, marks=pytest.mark.long), 1.5])
 def test_fixed_order_and_no_process_cost_what_a_planned_program_costs(over: float) -> None:
     """One machine that takes no time leaves one order: the cycle is a program of its own period."""

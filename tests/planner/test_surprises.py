@@ -55,6 +55,7 @@ def test_without_surprises_the_schedule_is_the_plan() -> None:
         assert parts[-1].joules == pytest.approx(plan.joules, rel=ROUNDING)
 
 
+@pytest.mark.long
 def test_without_surprises_parts_in_slots_are_in_the_plan_s_time() -> None:
     """A washer for two parts: followed by the signals of its slots, nobody is late."""
     cell = two_machines()
@@ -104,6 +105,7 @@ def test_a_machine_that_works_on_nothing_has_no_outage() -> None:
         outage_replay(planned(), "lathe", 600.0, 1, LENGTHS)
 
 
+@pytest.mark.long
 def test_who_knows_the_times_needs_no_more_and_longer_times_are_kept() -> None:
     cell = two_machines()
     machines = tuple(

@@ -169,6 +169,7 @@ def drawn_trajectory(
     return JointTrajectory.from_seconds(robot.joint_names, times, q, *derivatives)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("cell", MOSTLY_LONG)
 @pytest.mark.parametrize(("count", "known"), [(2, 2), (3, 1), (6, 0), (6, 2), (60, 1), (60, 2)])
 def test_reported_speeds_are_upper_bounds_and_close(

@@ -151,6 +151,7 @@ def test_every_objective_and_timing_keeps_it(objective: str, timing: str) -> Non
     assert judge.largest(plan.trajectory, axis, UP) <= NARROW + TOLERANCE
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("planner_id", ["direct", "tree", "detours", "retract"])
 def test_a_named_search_keeps_it_or_finds_nothing(planner_id: str) -> None:
     planner = planner_in("table_columns")

@@ -46,6 +46,7 @@ def not_worse(plan: CartesianPlan, other: CartesianPlan) -> None:
         assert plan.configurations < other.configurations
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", [7, 8, 13, 15])
 def test_a_path_costs_no_more_than_with_all_turns(planner: Planner, seed: int) -> None:
     path = random_path(np.random.default_rng(seed), planner.scene())

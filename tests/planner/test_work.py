@@ -25,6 +25,7 @@ SceneOf = Callable[[str], PlanningScene]
 OF_OMPL = ("kpiece", "bkpiece", "lbkpiece", "prm", "rrt", "rrt_connect", "aorrtc")
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("planner_id", ["", *(name for name in SEARCHES if name not in OF_OMPL)])
 @pytest.mark.parametrize("allowed", [1, 40, 700, 1500])
 def test_max_iterations_is_never_exceeded(planner_id: str, allowed: int, scene_of: SceneOf) -> None:

@@ -356,6 +356,7 @@ IN_REACH = f"""(() => {{ const {{ x, y, width, height }} = {STOP}.getBoundingCli
     return {STOP}.contains(document.elementFromPoint(x + width / 2, y + height / 2)); }})()"""
 
 
+@pytest.mark.long
 def test_a_grip_is_a_gap_with_its_name_in_the_clearance(
     browser: Any, live: tuple[LiveServer, Stream, list[tuple[str, bool]]]
 ) -> None:

@@ -95,6 +95,7 @@ def lacking(recording: Recording, missing: frozenset[int], events: int) -> Recor
     return replace(recording, events=recording.events[:events])
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", range(10))
 def test_no_page_of_a_recording_contradicts_its_numbers(analysis: Analysis, seed: int) -> None:
     rng = np.random.default_rng(seed)

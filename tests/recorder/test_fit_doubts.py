@@ -106,6 +106,7 @@ def test_a_drawn_robot_that_is_recorded_well_is_not_doubted(seed: int) -> None:
     assert doubted(drawn_meter(seed)) == ""
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     "kind",
     ["one phase", "kW as W", "A5 stands"]  # clocks, columns and signs of one robot are tested below
@@ -152,6 +153,7 @@ ZEROS = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "seed", "joint", "off"), ZEROS)
 def test_a_joint_whose_zero_is_elsewhere_is_named_by_the_watts(
     name: str, seed: int, joint: int, off: float

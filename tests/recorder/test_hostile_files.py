@@ -247,6 +247,7 @@ def test_damaged_files_are_read_in_part_or_refused(demo_file: Path, tmp_path: Pa
     assert max(taken for _, _, taken, _ in found.values()) < SECONDS
 
 
+@pytest.mark.long
 def test_a_topic_of_another_type_is_named(short_file: Path, tmp_path: Path) -> None:
     found = judged(other_types(read_raw(short_file), tmp_path / "x"), tmp_path)
     assert len(found) >= 36

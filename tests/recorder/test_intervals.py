@@ -56,6 +56,7 @@ def held(kind: str, count: int) -> float:
     return float(np.mean([each.low <= 0.0 <= each.high for each in found]))
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("count", "least"), [(10, 0.85), (20, 0.87), (60, 0.88), (200, 0.88)])
 @pytest.mark.parametrize("kind", TRUTHS)
 def test_the_interval_of_the_mean_holds_nine_times_of_ten(

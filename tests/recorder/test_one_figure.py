@@ -42,6 +42,7 @@ def found(request: pytest.FixtureRequest, analysis: Analysis) -> Analysis:
     return analyse(replace(analysis.recording, facts=facts))
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", range(3))
 def test_a_year_is_one_value_on_every_page(found: Analysis, seed: int) -> None:
     draw = np.random.default_rng(seed).uniform

@@ -151,6 +151,7 @@ def changed(raw: RawRecording, topic: str, messages: tuple[bytes, ...]) -> RawRe
     return dataclasses.replace(raw, channels=tuple(map(one, raw.channels)))
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("topic", ["joint_states", "power_state", "controller_state"])
 @pytest.mark.parametrize("content", [b"", b"\0", b"\0\1\0\0", b"\0\1\0\0" + 40 * b"\xff"])
 def test_empty_and_foreign_messages_on_a_known_topic_are_one_sentence(

@@ -160,6 +160,7 @@ def mixed(analysis: Analysis, costs: Costs) -> str:
     return fleet_html([member, undriven(member, "second")], costs=costs)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     "seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 4))]
 )

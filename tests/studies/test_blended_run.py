@@ -16,6 +16,7 @@ from ir_studies.stepped_run import driven_program
 WITHIN = 0.01  # of the joules: the plant is driven in steps
 
 
+@pytest.mark.long
 def test_a_blended_program_is_driven_as_planned() -> None:
     steps = (
         ProgramStep("POSTURE", "home"),

@@ -63,6 +63,7 @@ def test_the_best_of_a_grid_is_never_left_out(laid: Laid) -> None:
     assert best_cost(bounded) == best_cost(everything)
 
 
+@pytest.mark.long
 def test_rounds_come_nearer_than_a_first_look(laid: Laid) -> None:
     rounds = laid(SPREAD, "a")
     once = laid(replace(SPREAD, rounds=1), "b")
@@ -83,6 +84,7 @@ def test_interrupted_hanging_and_dying_it_leaves_the_same_files(laid: Laid, tmp_
     assert whole.summary == again.summary
 
 
+@pytest.mark.long
 def test_more_placements_are_added_to_a_folder_and_other_budgets_refused(laid: Laid) -> None:
     laid(SPREAD)
     made: list[str] = []
@@ -212,6 +214,7 @@ def test_why_the_others_were_not_planned(laid: Laid) -> None:
     assert "at most 16 plans were asked for" in laid(replace(GRID, plans=16), "b").summary
 
 
+@pytest.mark.long
 def test_where_the_bound_left_out_nothing_the_study_says_so(laid: Laid) -> None:
     few = laid(replace(GRID, steps=3), "few").summary
     assert (
@@ -278,6 +281,7 @@ def test_the_cell_of_a_study_is_the_one_that_it_began_with(laid: Laid, tmp_path:
     assert "placements looked at" in found.summary
 
 
+@pytest.mark.long
 def test_a_study_that_keeps_fewer_leaves_no_cell_of_one_that_kept_more(
     laid: Laid, tmp_path: Path
 ) -> None:
