@@ -156,7 +156,7 @@ def add_call(call: argparse.ArgumentParser) -> None:
     call.add_argument(
         "values", nargs="*", help="[type] and request as YAML, as for `ros2 service call`"
     )
-    call.add_argument("--timeout", type=float, default=60.0, help="s to wait for the answer (60)")
+    call.add_argument("--timeout", type=float, default=600.0, help="s to wait for the answer (600)")
     call.add_argument("--full", action="store_true", help="print long arrays whole")
     call.set_defaults(run=run_call)
 
