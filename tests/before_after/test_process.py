@@ -102,6 +102,7 @@ def test_every_program_works_along_the_seam_at_its_speed(
         assert seconds > length / SPEED
 
 
+@pytest.mark.long
 def test_nothing_is_saved_by_cutting_a_process(welded: BeforeAfter) -> None:
     """Law: the process costs in every program what such work costs; only what is around it may be
     dropped.

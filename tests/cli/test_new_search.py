@@ -150,6 +150,7 @@ def test_a_running_planner_node_plans_with_it_by_name(site: Path) -> None:
     assert NAME in wrong.stdout + wrong.stderr
 
 
+@pytest.mark.long
 def test_the_node_has_its_settings_as_parameters(site: Path) -> None:
     code = (
         "from ir_planner import PlannerSettings; from ir_values.settings import tree; "

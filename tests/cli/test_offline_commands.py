@@ -38,6 +38,7 @@ def test_help_imports_nothing_that_takes_long() -> None:
     assert not {"numpy", "yaml", "scipy", "rclpy", "importlib.metadata"} & set(loaded.split())
 
 
+@pytest.mark.long
 def test_no_command_without_ros_imports_rclpy(tmp_path: Path) -> None:
     trace = tmp_path / "m.csv"
     lines = (

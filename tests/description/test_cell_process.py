@@ -102,6 +102,7 @@ def test_meshes_are_bounded_together() -> None:
         read_cell_apart(head + "\n".join("  " + line for line in bodies.splitlines()), "")
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("dies", "why"),
     [

@@ -128,6 +128,7 @@ SHORT = (0, 7, 11, 10)  # two postures, and a pause at each
 WHOLE = range(13)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("steps", "pauses", "modes"),
     [

@@ -170,6 +170,7 @@ def rested(plant: Simulation, mode: str, wake_at: float) -> float:
     return plant.mains.energy() - begun
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("mode", "wake_at"),
     [("BUS_POWER_OFF", 6.0), ("BUS_POWER_OFF", 90.0), ("HIBERNATION", 400.0)],

@@ -38,6 +38,7 @@ def kr210(bodies: tuple[Body, ...]) -> CollisionModel:
     return CollisionModel(Chain(KR210, tcp=TCP), CAPSULES, bodies, SELF_PAIRS)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("bodies", SCENES)
 def test_compiled_and_reference_agree(bodies: tuple[Body, ...]) -> None:
     if compiled.MODULE is None:

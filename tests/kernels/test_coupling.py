@@ -75,6 +75,7 @@ def test_gradients_are_those_of_differences(core: Any, case: str) -> None:
                 assert np.abs(error).max() < 1e-6 * np.abs(exact).max() + 1e-3
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("case", ["kr210", "2", "6"])
 def test_no_torque_or_power_is_above_its_bound(core: Any, case: str) -> None:
     model = DynamicsModel(robot_of(case), (tool_155(),), core=core)

@@ -76,6 +76,7 @@ def test_the_configuration_a_pose_was_made_from_is_found(core: Any, robot: Robot
         )  # an angle near a singularity
 
 
+@pytest.mark.sampled
 def test_no_branch_is_missing_beside_a_numerical_search(core: Any) -> None:
     """Newton from a thousand starts finds nothing that the closed form doesn't have."""
     robot = kr210()

@@ -69,6 +69,7 @@ def of_reference() -> list[SplineDescent]:
     return [descended(None, 25, **options)[2] for options in DESCENTS]
 
 
+@pytest.mark.sampled
 def test_the_descent_lowers_the_cost_and_reports_it_truly(core: Any) -> None:
     last = np.inf
     for evaluations in (1, 12, 25) if core is None else (1, 12, 25, 50, 200):

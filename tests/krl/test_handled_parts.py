@@ -184,6 +184,7 @@ CARRIED = (
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "mass", [*(pytest.param(mass, marks=pytest.mark.long) for mass in (0, 50)), 150]
 )
@@ -265,6 +266,7 @@ def test_a_load_with_a_negative_inertia_is_refused(
         evaluate_krl(planner, followed(f"{load}\nPTP XHOME\nPTP {{A1 3}}"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "done",
     [

@@ -87,6 +87,7 @@ def test_the_answer_is_the_library_s_plan_and_is_kept(
     assert answer.proved == plan.proved
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("fields", "sentence"),
     [

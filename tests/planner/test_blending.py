@@ -248,6 +248,7 @@ def test_contacts_of_one_station_hold_in_a_joined_movement() -> None:
     assert joined > 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("style", ["spline", pytest.param("kss8", marks=pytest.mark.long)])
 def test_a_passed_stop_is_written_as_krl_and_driven_without_a_rest_there(style: str) -> None:
     cell, stops = drawn_cell("open", 2)

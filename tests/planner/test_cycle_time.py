@@ -212,6 +212,7 @@ def planned(demo_cell: Cell, power: PowerData) -> Callable[[float], ProgramPlan]
     return plan
 
 
+@pytest.mark.long
 def test_a_little_less_time_costs_little_more(planned: Callable[[float], ProgramPlan]) -> None:
     free = planned(0.0).report
     shorter = planned(0.97 * free.duration).report
@@ -279,6 +280,7 @@ def test_the_front_of_a_program_keeps_the_law_of_waiting(demo_cell: Cell, power:
         assert energy[b] <= 1.005 * (energy[a] + wait)
 
 
+@pytest.mark.long
 def test_without_a_cycle_time_objective_energy_says_that_it_is_slow() -> None:
     planner = Planner("demo", clock=lambda: 0.0)
     stops = ("infeed_pick", "park")

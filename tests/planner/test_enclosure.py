@@ -145,6 +145,7 @@ tcp: {xyz: [0.6, 0, 0]}
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("half", [0.34, 0.6])
 def test_a_slot_for_the_arm_lets_a_thicker_load_out_or_not(half: float) -> None:
     cell = cell_from_yaml(BALL)

@@ -171,6 +171,7 @@ def test_a_program_is_planned_with_little_work_and_takes_no_more_than_allowed() 
     assert plan.info.iterations <= 1_500 * len(planner.cell.program)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cell", ["open", "table_columns"])
 def test_a_movement_that_more_work_finds_is_refused_for_the_work(cell: str) -> None:
     """Whether a path or a duration is what little work doesn't find."""

@@ -111,6 +111,7 @@ def full(detour: JointTrajectory, scene: PlanningScene) -> OptimizationPlan:
 # -- better
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("order", ["linear", "cubic", "quintic"])
 def test_any_kind_of_trajectory_becomes_cheaper_between_the_same_ends(
     order: str, detour: JointTrajectory, scene: PlanningScene

@@ -188,6 +188,7 @@ def test_the_same_request_gives_the_same_bytes(scene: PlanningScene) -> None:
     assert first.trajectory == second.trajectory
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("count", "by"), [(3, 0.25), (5, 0.25), (9, 0.25), (9, 0.4), (60, 0.25)])
 def test_near_the_time_of_toppra_that_needs_no_jerk_limit(
     count: int, by: float, scene: PlanningScene

@@ -45,6 +45,7 @@ def test_a_movement_relies_on_the_door_where_it_comes_too_near_to_the_closed_one
     assert not all(relied)
 
 
+@pytest.mark.long
 def test_the_hash_of_the_cell_stays_while_the_door_moves(program):
     _, shut = program
     planner = Planner("demo", clock=lambda: 0.0)

@@ -74,6 +74,7 @@ def tended(visits: tuple[str, ...]) -> list[str]:
     return ["lathe.1", "lathe.2", *others]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("visits", LINES)
 def test_a_lathe_for_two_parts_is_twice_as_soon_and_no_dearer(visits: tuple[str, ...]) -> None:
     plan = lathe_line(visits, 2, 45.0)

@@ -233,6 +233,7 @@ def test_a_tilt_between_the_points_of_a_trajectory_is_found() -> None:
     assert Judge(planner).largest(given, axis, UP) <= wide.report.largest_tilt <= 0.8
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("cell", "direction"),
     [

@@ -205,6 +205,7 @@ VIA_CELL = replace(
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cycle_time", [pytest.param(0.0, marks=pytest.mark.long), 40.0])
 def test_steps_of_a_program_pass_their_places(cycle_time: float) -> None:
     """Found and judged in the cell that its file says."""

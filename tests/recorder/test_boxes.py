@@ -184,6 +184,7 @@ PAGES: dict[str, Callable[[Analysis], str]] = {
 SOONER = ("report", "fleet", "layout")  # the others only in the long tests
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     "name",
     [name if name in SOONER else pytest.param(name, marks=pytest.mark.long) for name in PAGES],
@@ -217,6 +218,7 @@ def test_nothing_is_cut_overlaps_or_scrolls_and_axe_finds_nothing(
     assert {size: found for size, found in faults.items() if found} == {}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name", ["report", pytest.param("before and after", marks=pytest.mark.long)]
 )

@@ -143,6 +143,7 @@ def quantities(analysis: Analysis, cycle: Production, costs: Costs) -> dict[str,
     return found
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", SEEDS)
 def test_figures_of_one_name_are_one_value_on_every_page(walked: Analysis, seed: int) -> None:
     costs = costs_of(seed)
