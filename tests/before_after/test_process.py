@@ -119,6 +119,7 @@ def test_nothing_is_saved_by_cutting_a_process(welded: BeforeAfter) -> None:
     assert any("lines_8_to_10" in note for note in welded.notes)
 
 
+@pytest.mark.long
 def test_corners_of_a_process_are_not_counted_as_stops_less(welded: BeforeAfter) -> None:
     """Today's program drives it in a movement from corner to corner, the planner in one that rests
     there.

@@ -50,6 +50,7 @@ def test_the_examples_are_numbered_without_a_gap() -> None:
     assert [path.stem[:2] for path in EXAMPLES] == [f"{number:02}" for number in range(1, 9)]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_the_example_prints_what_it_promises(
     path: Path, recording: Path, capsys: pytest.CaptureFixture[str]

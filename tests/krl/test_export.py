@@ -215,6 +215,7 @@ def test_written_signals_are_read_back(planner: Planner) -> None:
     assert "SIGNAL S_WAIT $OUT[1]" in texts.data
 
 
+@pytest.mark.long
 def test_the_commands_of_the_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = tmp_path / "visit.src"
     assert main(["krl", "export", "open", "-o", str(source), "--stations", "p1", "home"]) == 0

@@ -98,6 +98,7 @@ def with_pauses(planner: Planner, plan: Any, rng: np.random.Generator) -> tuple[
     return tuple(steps)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("style", STYLES)
 def test_an_export_costs_what_its_comments_say(demo: tuple[Planner, Any], style: str) -> None:
     planner, plan = demo
@@ -120,6 +121,7 @@ def test_every_sequence_of_modes_comes_back(demo: tuple[Planner, Any], seed: int
     assert not any(one.power_mode for one in plain.steps)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("free", "steps"),
     [

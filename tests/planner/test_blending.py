@@ -127,7 +127,6 @@ def judged(planner: Planner, movements: tuple[PlannedMovement, ...]) -> None:
     ("name", "seeds"),
     [
         ("kr6_bench", range(1)),
-        ("ur10e_bench", range(1)),
         *(pytest.param(name, range(7), marks=pytest.mark.long) for name in CELLS),
     ],
 )

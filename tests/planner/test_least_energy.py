@@ -128,6 +128,7 @@ def test_no_answer_costs_more_than_a_shorter_one_stretched(
         assert longer.report.energy <= energy * (1.0 + 1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.sampled
 @pytest.mark.parametrize(
     ("cell", "seed"),

@@ -287,6 +287,7 @@ SEARCHES[sys.argv[1]].find(Ends(np.array(task.start), beyond), space, 1, space.w
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stopped", [False, True])
 def test_what_a_planner_that_is_killed_leaves_ends(stopped: bool, wait_for: Any) -> None:
     asking = subprocess.Popen(

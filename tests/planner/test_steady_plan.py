@@ -86,6 +86,7 @@ def test_a_lathe_for_two_parts_is_twice_as_soon_and_no_dearer(visits: tuple[str,
     assert plan.cycle.most == (2, *(1 for _ in visits[2:-1]))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("visits", LINES)
 def test_bars_of_a_machine_are_its_work_and_no_more_parts_than_it_works_on(
     visits: tuple[str, ...],
@@ -141,6 +142,7 @@ def test_the_search_for_a_cycle_ends_on_request(searching: Event) -> None:
         steady(CELL, parts_per_hour=30.0, cancelled=searching.is_set)
 
 
+@pytest.mark.long
 def test_two_parts_a_cycle_are_searched_for_until_the_time_is_up(searching: Event) -> None:
     plan = steady(CELL, clock=lambda: 1e6 * searching.is_set(), parts_per_hour=30.0, units=2)
     assert plan.info.truncated

@@ -443,6 +443,7 @@ def test_the_live_view_on_a_phone_only_watches_without_the_token(
     page.close()
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("size", [DESK, PHONE, PAPER])
 def test_nothing_of_the_live_view_is_cut_overlaps_or_scrolls_and_axe_finds_nothing(
     browser: Any, live: tuple[LiveServer, Stream, list[tuple[str, bool]]], size: tuple[int, int]

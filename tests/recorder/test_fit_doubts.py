@@ -124,6 +124,7 @@ def test_a_meter_whose_clock_is_off_is_told_with_the_seconds_to_add(steps: int) 
     assert f"add {-steps * STEP:.2f} s to the clock_offset" in said
 
 
+@pytest.mark.long
 def test_columns_that_were_taken_for_each_other_are_named() -> None:
     samples = metered(3)
     order = [0, 2, 1, 3, 4, 5]

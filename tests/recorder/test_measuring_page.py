@@ -93,6 +93,7 @@ def test_what_a_plant_showed_is_a_trace_with_modes_and_loads(folder: Path) -> No
     np.testing.assert_allclose(q[-1], end, atol=1e-3)  # what the feedback leaves
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("key", "value", "said"),
     [

@@ -254,6 +254,7 @@ def test_a_pair_is_made_alike_in_any_process(study_of_a_pair: StudyOfAPair) -> N
     assert maker(asked)({"number": 0}) == study_of_a_pair.row
 
 
+@pytest.mark.long
 def test_a_study_leaves_table_and_page(study_of_a_pair: StudyOfAPair, tmp_path: Path) -> None:
     study = study_of_a_pair.study
     answer = study_of_a_pair.answer
