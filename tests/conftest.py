@@ -38,13 +38,14 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
 
 
+@pytest.hookimpl(trylast=True)  # of what -k, -m and paths leave
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Keep the first and the last case of each `sampled` test, where long tests are left out."""
     if config.option.markexpr != "not long":
         return
     cases: dict[str, list[pytest.Item]] = {}
     for item in items:
-        if item.get_closest_marker("sampled") and not item.get_closest_marker("long"):
+        if item.get_closest_marker("sampled"):
             cases.setdefault(item.nodeid.partition("[")[0], []).append(item)
     left = {id(item) for each in cases.values() for item in each[1:-1]}
     config.hook.pytest_deselected(items=[item for item in items if id(item) in left])

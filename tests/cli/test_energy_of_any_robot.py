@@ -47,7 +47,7 @@ def cell(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     return str(page)
 
 
-def motion(robot: RobotModel, seconds: float = 12.0) -> Samples:
+def motion(robot: RobotModel, seconds: float = 20.0) -> Samples:
     """Movements about home with rests between them."""
     rng = np.random.default_rng(2)
     step = 0.01

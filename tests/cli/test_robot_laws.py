@@ -256,7 +256,7 @@ def test_links_that_lie_in_each_other_but_never_meet_keep_their_postures(tmp_pat
     """
     from judge_robots import Judge, verdict
 
-    turns = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(500)
+    turns = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(2000)
     z = np.linspace(-1.0, 1.0, len(turns))
     beside = np.sqrt(1.0 - z**2)
     points = np.stack([beside * np.cos(turns), beside * np.sin(turns), z], axis=1)
