@@ -40,7 +40,7 @@ from ir_recorder.report.costs import (
     recorded_idle_saving,
 )
 from ir_recorder.report.fleet import fleet_html, fleet_of_line, member_of
-from ir_recorder.report.money_text import money, together, yearly_money, yearly_span
+from ir_recorder.report.money_text import money, yearly_money, yearly_span
 from ir_recorder.report.number_text import kilograms, kilowatt_hours
 from ir_recorder.report.paid import with_span
 from ir_values.settings import settings_table
@@ -336,7 +336,7 @@ def test_a_fleet_counts_the_same_robots_in_shifts_and_at_night(
     shifts += costs.money(costs.energy_of_year(bare.cycle).value)
     picture = page.split('<section id="year">')[1].partition("</section>")[0]
     nights = 2.0 * idle.left_alone
-    assert f"<b>{yearly_money(together((shifts, nights)), 'EUR')}</b>" in picture
+    assert f"<b>{yearly_money(shifts + nights, 'EUR')}</b>" in picture
     assert "second alike in all: no file says what its plan saves" in picture
     driven = picture.partition("today: as driven")[2]
     assert f"{yearly_money(nights, 'EUR')} outside" in driven  # nobody recorded a night
@@ -383,13 +383,13 @@ def test_hibernation_outside_of_the_shifts_is_a_headline(
     common = costs.common_of_year(cycle)
     assert common is not None
     shifts = costs.money(common), costs.money(costs.energy_of_year(cycle).value)
-    today = together((shifts[0], found.left_alone))
-    then = together((costs.money(common - year.value), found.deepest))
+    today = shifts[0] + found.left_alone
+    then = costs.money(common - year.value) + found.deepest
     both = yearly_money(today - then, "EUR")
     energy = year.value + found.energy.value
     assert found.energy.value == pytest.approx(power * costs.idle_hours * 3600.0)
     headline = f"{kilowatt_hours(energy)}, {kilograms(costs.co2(energy))} CO2 less"
-    driven = yearly_money(together(shifts[:1]) - together(shifts[1:]), "EUR")  # no nights in it
+    driven = yearly_money(shifts[0] - shifts[1], "EUR")  # no nights in it
     for page in (report_html(analysis, (), costs=costs), fleet_html([member], costs=costs)):
         answer = plain(page).split('<section id="answer">')[1]
         assert f"<b>{driven} of {both} a year reached</b>" in answer

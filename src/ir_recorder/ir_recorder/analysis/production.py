@@ -46,6 +46,9 @@ ENDED = "ended"  # outcome of a step
 PREDICTED = "predicted"
 PLANNED_MOVING = "MOVING"
 NO_MODE = "STAND_ON_MOTORS"
+WAITING = "waiting between steps"
+SLOWER = "slower, in the common program's time"
+FULL_PAUSES = "pauses at full length"
 HIBERNATION = "HIBERNATION"
 OPEN = "zero lies in it: it is open whether anything is saved"
 DRIVES_ONLY = "drives only, controller not counted"
@@ -117,10 +120,13 @@ class Production:
 
     name: which cycle that is; origin: "measured", "simulated", "recorded" or "predicted". low, high
     [J]: 90 % interval of the energy, alike where there is none. cycles: how many the recording
-    holds. modes, steps: shares by power mode and by movement or pause; the modes' sum is the
+    holds. modes, steps: shares by power mode and by movement or pause; the sum of either is the
     cycle's energy. savings: what the plan saves of the common program, pauses at full length; None
     where it is not known. notes: sentences that limit the figures. drives_only: joules are those of
-    drives and tool, as nobody knows what the controller draws.
+    drives and tool, as nobody knows what the controller draws. computed: what nobody drove of a
+    cycle that was driven, the rest of its shortened pauses; None where all was driven. basis: what
+    powers at rest are from. own: the planned program as its steps are, where the cycle is that of
+    the same stops in the common program's time; None elsewhere.
     """
 
     name: str
@@ -135,6 +141,9 @@ class Production:
     savings: ProgramSavings | None = None
     notes: tuple[str, ...] = ()
     drives_only: bool = False
+    computed: Share | None = None
+    basis: str = ""
+    own: Share | None = None
 
     @property
     def pace(self) -> float:
@@ -240,6 +249,13 @@ def _driven(analysis: Analysis, program: ProgramTotals) -> Production | None:
     savings = _full_savings(analysis.savings, full)
     energy = (full.energy if full is not None else whole.energy) / cycles
     seconds = (full.seconds if full is not None else whole.seconds) / cycles
+    computed = None
+    if full is not None:
+        computed = Share(
+            FULL_PAUSES,
+            sum(pause.seconds for pause in full.added) / cycles,
+            sum(pause.energy for pause in full.added) / cycles,
+        )
     return Production(
         name,
         analysis.recording.origin,
@@ -249,9 +265,11 @@ def _driven(analysis: Analysis, program: ProgramTotals) -> Production | None:
         energy,
         cycles,
         _modes(analysis, full, seconds, energy, cycles, _all_of(analysis)),
-        _steps(analysis, full, cycles, _all_of(analysis)),
+        _steps(analysis, full, seconds, energy, cycles, _all_of(analysis)),
         savings.of_part(cycles / programs) if savings is not None else None,
         tuple(notes),
+        computed=computed,
+        basis=rest_basis(measured=rest_measured(analysis)) if computed is not None else "",
     )
 
 
@@ -279,7 +297,7 @@ def _tended(analysis: Analysis, tending: Tending, whole: Share, notes: Sequence[
         energy,
         whole.seconds / seconds,
         _modes(analysis, None, seconds, energy, count, time),
-        _steps(analysis, None, count, time),
+        _steps(analysis, None, seconds, energy, count, time),
         _of_parts(analysis.savings, tending),
         tuple(notes),
     )
@@ -348,8 +366,14 @@ def _added(program: ProgramTotals | None) -> tuple[FullPause, ...]:
 
 
 def _steps(
-    analysis: Analysis, full: Unshortened | None, cycles: float, time: Span
+    analysis: Analysis,
+    full: Unshortened | None,
+    seconds: float,
+    energy: float,
+    cycles: float,
+    time: Span,
 ) -> dict[str, Share]:
+    """Shares of the movements and pauses in a time, and of the waiting between them."""
     rows = [
         (result.step.label, result.seconds, result.energy)
         for result in analysis.steps
@@ -360,7 +384,16 @@ def _steps(
             (analysis.steps[pause.step].step.label, pause.seconds, pause.energy)
             for pause in full.added
         ]
-    return _summed(rows, cycles)
+    found = _summed(rows, cycles)
+    if all(math.isfinite(joules) for _, _, joules in rows):
+        between = seconds - sum(share.seconds for share in found.values())
+        joules = energy - sum(share.energy for share in found.values())
+        if between > _STAMP:
+            found[WAITING] = Share(WAITING, between, joules)
+    return found
+
+
+_STAMP = 1e-6  # s: stamps of messages are no finer
 
 
 def _summed(rows: Iterable[tuple[str, float, float]], cycles: float = 1.0) -> dict[str, Share]:
@@ -407,6 +440,13 @@ def driven_and_predicted(analysis: Analysis) -> tuple[float, float]:
     return program.whole.energy, planned if planned > 0.0 else math.nan
 
 
+def deviation(driven: float, predicted: float) -> float:
+    """How much more was driven than predicted [J], as a share of what was predicted; NaN where one
+    is not known. Every page has it of the runs as they were driven, waits between steps included.
+    """
+    return driven / predicted - 1.0 if predicted > 0.0 else math.nan
+
+
 def demand_watts(analysis: Analysis, cycle: Production) -> float:
     """The largest mean power [W] of a quarter of an hour of cycles, one after the other.
 
@@ -442,7 +482,8 @@ def stretches(analysis: Analysis) -> list[tuple[float, float]]:
     """
     power = analysis.recording.power
     if analysis.program is None:
-        return [(step.duration, step.report.energy) for step in analysis.recording.planned]
+        planned = [(step.duration, step.report.energy) for step in analysis.recording.planned]
+        return [*planned, *_slower(production_of(analysis))]
     if power is None or len(power.time) < 2:
         return []
     span = _counted(analysis)
@@ -463,6 +504,13 @@ def stretches(analysis: Analysis) -> list[tuple[float, float]]:
         turn = end
     rows.append((span.end - turn, meter.energy(turn, span.end)))
     return [row for row in rows if row[0] > 0.0]
+
+
+def _slower(cycle: Production | None) -> list[tuple[float, float]]:
+    """Seconds and joules of a plan's cycle beyond its steps: none but in another program's time."""
+    if cycle is None or cycle.own is None:
+        return []
+    return [(cycle.seconds - cycle.own.seconds, cycle.energy - cycle.own.energy)]
 
 
 def idle_watts(analysis: Analysis) -> dict[str, float]:
@@ -510,6 +558,11 @@ def saved_at_rest(cell: Cell, load: str, data: PowerData) -> Amount:
         for mode in (BRAKES, HIBERNATION)
     )
     return Amount(saved, *interval_over(saved, brakes - deepest))
+
+
+def rest_basis(*, measured: bool) -> str:
+    """What powers at rest are from, in words."""
+    return "from measured powers" if measured else "from the data sheet, not measured"
 
 
 def rest_measured(analysis: Analysis) -> bool:
@@ -601,6 +654,7 @@ def _paced(plan: Production, total: Saving) -> Production:
     if total.seconds <= 0.0:
         return plan
     rows = [(share.name, share.seconds, share.energy) for share in plan.modes.values()]
+    steps = {**plan.steps, SLOWER: Share(SLOWER, seconds, energy)}
     return replace(
         plan,
         name="planned program, in the time of the common one, predicted",
@@ -609,6 +663,8 @@ def _paced(plan: Production, total: Saving) -> Production:
         low=plan.low + energy,
         high=plan.high + energy,
         modes=_summed([*rows, (PLANNED_MOVING, seconds, energy)]),
+        steps=steps,
+        own=Share("planned program, as fast as pays", plan.seconds, plan.energy),
     )
 
 
@@ -705,7 +761,5 @@ def _time_levers(analysis: Analysis) -> list[Lever]:
             "deeper modes, earlier, woken later; a tool that can be switched off",
             "what they take above the deepest mode at machine home",
         ),
-        Lever(
-            "waiting between steps", waiting, "machines and nodes that answer sooner", "all of it"
-        ),
+        Lever(WAITING, waiting, "machines and nodes that answer sooner", "all of it"),
     ]

@@ -35,6 +35,8 @@ from ir_recorder.report.costs import (
     assumed_section,
     counted_with,
     following_price,
+    origin_of,
+    own_pace,
     recorded_idle_saving,
     saved_year,
 )
@@ -43,7 +45,6 @@ from ir_recorder.report.headline import checked, plant_of
 from ir_recorder.report.money_text import (
     money_of,
     span_of_money,
-    sum_of_money,
     yearly_money,
     yearly_span,
 )
@@ -211,6 +212,11 @@ def _problems(analyses: Sequence[Analysis], names: Sequence[str]) -> str:
     ]
     if _apart(analyses):
         items.append("<li>These recordings are of different cells.</li>")
+    items += [
+        f"<li>{text(name)}: {text(own_pace(cycle))}</li>"
+        for name, cycle in zip(names, map(production_of, analyses), strict=True)
+        if own_pace(cycle)
+    ]
     if len({(a.recording.origin, a.recording.plant) for a in analyses}) > 1:
         never = any(each.recording.never_driven for each in analyses)
         why = "not all were driven" if never else "they are of different plants"
@@ -266,10 +272,14 @@ def _year_bars(
             Piece(style, "in shifts", price.value),
             Piece(f"{style} night", "at night and at weekends", night),
         )
-        outside = f", {yearly_money(night, costs.currency)} outside" if night > 0.0 else ""
-        notes = (f"{shifts} in shifts{outside}, {cycle.origin}",)
+        outside = (
+            f", {yearly_money(night, costs.currency)} outside on closed brakes"
+            if night > 0.0
+            else ""
+        )
+        notes = (f"{shifts} in shifts{outside}, {origin_of(cycle)}",)
         whisker = (price.low + night, price.high + night)
-        total = sum_of_money((price.value, night), costs.currency)
+        total = yearly_money(price.value + night, costs.currency)
         rows.append(Row(name, pieces if night > 0.0 else pieces[:1], total, notes, whisker=whisker))
     return bars(rows, "a year of such cycles") if len(rows) > 1 else ""
 

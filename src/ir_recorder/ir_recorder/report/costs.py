@@ -20,6 +20,7 @@ from ir_recorder.analysis.production import (
     idle_watts,
     levers,
     production_of,
+    rest_basis,
     rest_measured,
     rest_saving,
     saved_amount,
@@ -343,12 +344,56 @@ def costs_section(analysis: Analysis, costs: Costs) -> str:
         else "Nothing was driven: energy is that of the plan, predicted"
     )
     notes = "".join(f" {note[0].upper()}{note[1:]}." for note in cycle.notes)
+    pace = own_pace(cycle)
     return (
         '<section id="costs"><h2>What a cycle costs</h2>'
         f"{table(heads, rows, 'What a cycle costs')}"
         f'<p class="hint">{text(origin)}{_saving_is(cycle)}. A year has '
         f"{cycles_of_year(cycle.pace, costs)}{_waits(cycle, costs)}.{text(notes)}"
-        f"{_bridge(analysis, cycle)} {counted_with(costs)}</p></section>"
+        f"{_bridge(analysis, cycle)}{text(f' {pace}' if pace else '')} {counted_with(costs)}</p>"
+        "</section>"
+    )
+
+
+def computed_words(*cycles: Production) -> str:
+    """How much of cycles that were driven nobody drove, and what that is from; "" where all of it
+    was.
+    """
+    rests = [cycle.computed for cycle in cycles if cycle.computed is not None]
+    if not rests:
+        return ""
+    part = share(sum(rest.energy for rest in rests), sum(cycle.energy for cycle in cycles))
+    bases = dict.fromkeys(cycle.basis for cycle in cycles if cycle.computed is not None)
+    return f"{part} of it computed: {rests[0].name}, {' and '.join(bases)}"
+
+
+def origin_of(cycle: Production) -> str:
+    """Whether a cycle was simulated, measured or predicted, and what of it was computed."""
+    computed = computed_words(cycle)
+    return f"{cycle.origin}, {computed}" if computed else cycle.origin
+
+
+def driven_name(cycle: Production) -> str:
+    """What a year of a cycle that was driven is called; its full pauses are named, where nobody
+    drove them.
+    """
+    pauses = "" if cycle.computed is None else ", full pauses computed"
+    return f"as driven, {cycle.origin}{pauses}"
+
+
+def own_pace(cycle: Production | None) -> str:
+    """That a plan's steps are those of the program as fast as pays, where its money is of the same
+    stops in the common program's time, and how far they are apart; "" elsewhere.
+    """
+    if cycle is None or cycle.own is None:
+        return ""
+    sooner = seconds(cycle.seconds - cycle.own.seconds)
+    word, energy = Amount.of_value(cycle.energy - cycle.own.energy).gain()
+    less = "less" if word == "saved" else "more"
+    return (
+        f"Steps, motion and charts are of the planned program as fast as pays: {sooner} sooner "
+        f"and {kilowatt_hours(energy.value)} {less} a cycle than in the common program's time, "
+        "which all money is of."
     )
 
 
@@ -370,7 +415,10 @@ def _waits(cycle: Production, costs: Costs) -> str:
     if seconds(cycle.pace) == seconds(cycle.seconds):
         return ""
     sooner = seconds(cycle.pace - cycle.seconds)
-    return f" as in the common program; this cycle ends {sooner} sooner"
+    return (
+        f" as in the common program; this cycle ends {sooner} sooner, and what the robot takes "
+        "while it waits for the next is not counted"
+    )
 
 
 def _bridge(analysis: Analysis, cycle: Production) -> str:
@@ -709,7 +757,7 @@ class IdleSaving:
     @property
     def basis(self) -> str:
         """What the powers rest on, in words."""
-        return "from measured powers" if self.measured else "from the data sheet, not measured"
+        return rest_basis(measured=self.measured)
 
     @property
     def saved(self) -> float:

@@ -18,6 +18,7 @@ from ir_recorder.analysis.production import (
     Amount,
     Production,
     demand_watts,
+    deviation,
     driven_and_predicted,
     idle_watts,
     levers,
@@ -39,6 +40,7 @@ from ir_recorder.report.costs import (
     Costs,
     IdleSaving,
     assumed_section,
+    computed_words,
     counted_with,
     demand_note,
     following_price,
@@ -51,7 +53,7 @@ from ir_recorder.report.costs import (
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import started
 from ir_recorder.report.methods import counted
-from ir_recorder.report.money_text import NOTHING, money_of, sum_of_money, yearly_money, yearly_span
+from ir_recorder.report.money_text import NOTHING, money_of, yearly_money, yearly_span
 from ir_recorder.report.number_text import (
     DASH,
     ENGLISH,
@@ -460,6 +462,8 @@ def fleet_html(
     robots = robots_of(members, prices)
     known = at_mains(members)
     summed = [robot for robot in robots if not robot.drives_only]
+    paid = _paid(known, prices)
+    basis = _computed(known)
     sections = [
         _section("Robots, those that cost most first", _robots(members, robots, prices), "robots"),
         _section(
@@ -470,15 +474,15 @@ def fleet_html(
         _all_robots(members, robots, prices),
         folded(_section("Peak, and when nobody works", _around_the_clock(members, robots, prices))),
         folded(line_section(fleet_of_line(members, prices), prices)),
-        folded(_section("By power mode", _matrix("mode", by_mode(known, prices), summed))),
+        folded(_section("By power mode", _matrix("mode", by_mode(known, prices), summed, basis))),
         folded(
             _section(
-                "By movement and pause", _matrix("movement", by_movement(known, prices), summed)
+                "By movement and pause",
+                _matrix("movement", by_movement(known, prices), summed, basis),
             )
         ),
         assumed_section(prices),
     ]
-    paid = _paid(known, prices)
     first = _answer(paid, robots, prices).html()
     year = paid.picture(prices)
     shown = [tile for tile in _tiles(paid, known, robots, prices) if tile is not None]
@@ -527,12 +531,10 @@ def _answer(paid: Paid, robots: Sequence[Robot], costs: Costs) -> Answer:
         result = paid.reached_words(costs)
     saved = year.with_energy(costs)
     before = paid.before_amounts(costs)
-    share = (
-        f"{percent_of(gain.value, sum(before))} of the {sum_of_money(before, costs.currency)} of "
-        f"{paid.before}"
-    )
+    whole = yearly_money(sum(before), costs.currency)
+    share = f"{percent_of(gain.value, sum(before))} of the {whole} of {paid.before}"
     parts = [
-        f"{counted(len(summed), 'robot')} together",
+        f"{counted(len(summed), 'robot')}{' together' if len(summed) > 1 else ''}",
         share if paid.saved is not None and sum(before) > 0.0 else "",
         f"{saved} {less}" if saved else "",
         payback(year.money, costs),
@@ -556,7 +558,10 @@ def _steps(paid: Paid, robots: Sequence[Robot], costs: Costs) -> tuple[list[str]
     found: list[tuple[float, str]] = []
     if paid.idle is not None:
         price = with_span(paid.idle.money, costs)
-        words = f"All together in {at_night(paid.idle)}: {price} a year."
+        resting = at_night(paid.idle)
+        several = sum(not robot.drives_only for robot in robots) > 1
+        words = f"All together in {resting}" if several else f"{resting[0].upper()}{resting[1:]}"
+        words = f"{words}: {price} a year."
         found.append((paid.idle.saved, words))
     done = []
     for driven in (True, False):
@@ -704,8 +709,17 @@ def _paid(members: Sequence[Member], costs: Costs) -> Paid:
         of,
         f"{COMMON}s",
         now if driven else None,
+        run=_computed(members),
         reached=sum_of(driven) if driven else None,
     )
+
+
+def _computed(members: Sequence[Member]) -> str:
+    """What nobody drove of the cycles that count as driven, in a sentence; "" where all was."""
+    bases = dict.fromkeys(m.cycle.basis for m in members if m.cycle.computed is not None)
+    if not bases:
+        return ""
+    return f"Pauses that runs shortened count at full length: computed, {' and '.join(bases)}."
 
 
 _ROBOT_HEADS = (
@@ -757,7 +771,9 @@ def _robot_row(robot: Robot, members: Sequence[Member], costs: Costs) -> tuple[s
     made = ", ".join((robot.cell, _origins(own), *([DRIVES_ONLY] if robot.drives_only else ())))
     how = "" if robot.driven else " as planned"
     each = f"a part{how} {kilowatt_hours(part)}, {money_of_thousand(part, costs)}"
-    today = f"<small>{COMMON}, predicted</small>" if _stands(robot) else ""
+    stands = f"{COMMON}, predicted" if _stands(robot) else ""
+    today = stands or computed_words(*(member.cycle for member in own))
+    today = f"<small>{text(today)}</small>" if today else ""
     return (
         f"{text(robot.name)}<small>{text(made)}</small><small>{text(each)}</small>",
         f"{_yearly(robot.now, costs)}{today}",
@@ -900,7 +916,7 @@ def _months(members: Sequence[Member]) -> str:
     for month, origin in kinds:
         own = [m for m in known if (m.month, m.cycle.origin) == (month, origin)]
         driven, predicted = (sum(getattr(m, name) for m in own) for name in ("driven", "predicted"))
-        shares = [m.driven / m.predicted - 1.0 for m in own]
+        shares = [deviation(m.driven, m.predicted) for m in own]
         made = f"{origin}, {counted(len({m.robot for m in own}), 'robot')}"
         if len(own) > 1:
             made += f", {counted(len(own), 'recording')}"
@@ -911,7 +927,7 @@ def _months(members: Sequence[Member]) -> str:
                 f"{text(month)}<small>{text(made)}</small>",
                 f"<b>{kilowatt_hours(driven)}</b>",
                 kilowatt_hours(predicted),
-                f"<b>{percent(driven / predicted - 1.0)}</b>{ends if len(own) > 1 else ''}",
+                f"<b>{percent(deviation(driven, predicted))}</b>{ends if len(own) > 1 else ''}",
             )
         )
     heads = ("month", ">driven", ">predicted", ">difference")
@@ -979,8 +995,15 @@ def _saved(amount: Amount | None, costs: Costs) -> str:
     return f"<b>{text(price)}</b><small>{text(energy)}</small>{between}"
 
 
-def _matrix(what: str, found: Mapping[str, Mapping[str, float]], robots: Sequence[Robot]) -> str:
-    """Rows by name, a column for each of the first robots, one for the others and one for all."""
+def _matrix(
+    what: str,
+    found: Mapping[str, Mapping[str, float]],
+    robots: Sequence[Robot],
+    basis: str,
+) -> str:
+    """Rows by name, a column for each of the first robots, one for the others and one for all;
+    basis: a sentence that limits them.
+    """
     if not found:
         return '<p class="empty">No recording says it.</p>'
     names = list(found)
@@ -988,7 +1011,8 @@ def _matrix(what: str, found: Mapping[str, Mapping[str, float]], robots: Sequenc
     if len(names) > _ROWS:
         rest = {r.name: sum(found[name].get(r.name, 0.0) for name in names[_ROWS:]) for r in robots}
         rows.append(_row(REST, rest, robots))
-    return table((what, *_robot_heads(robots), ">all"), rows, f"kWh a year by {what}")
+    hint = f'<p class="hint">{text(basis)}</p>' if basis else ""
+    return table((what, *_robot_heads(robots), ">all"), rows, f"kWh a year by {what}") + hint
 
 
 def _robot_heads(robots: Sequence[Robot]) -> list[str]:
@@ -1013,7 +1037,7 @@ def _potential(members: Sequence[Member], robots: Sequence[Robot], costs: Costs)
         (costs.money(sum(own.values())), text(_shown(name)), own)
         for name, own in by_measure(members, costs).items()
     ]
-    found += _night(members, robots, costs)
+    found += [*_night(members, robots, costs), *_of_plans(robots, costs)]
     if not found:
         return '<p class="empty">No recording says it.</p>'
     found.sort(key=lambda measure: -measure[0])
@@ -1030,6 +1054,9 @@ def _potential(members: Sequence[Member], robots: Sequence[Robot], costs: Costs)
     ]
     heads = ("what", ">a year", "")
     hint = "Upper bounds, each by itself: together they count some joules twice."
+    undriven = [robot for robot in robots if not robot.driven]
+    if undriven:
+        hint += f" Of plans that nobody drove no movement is counted: {text(_names(undriven))}."
     little = [name for price, name, _ in found if price < _LITTLE * most]
     if little:
         hint += f" Less than {100.0 * _LITTLE:g} % of the largest: {', '.join(little)}."
@@ -1060,6 +1087,29 @@ def _night(
     basis = f"{nights.mode} instead of closed brakes, {nights.basis}, 90 % interval {ends}"
     name = f"at night and at weekends<small>{text(basis)}</small>"
     return [(nights.saved, name, energies)]
+
+
+def _of_plans(
+    robots: Sequence[Robot], costs: Costs
+) -> list[tuple[float, str, Mapping[str, float]]]:
+    """Plans that nobody drove, and what runs took above theirs, as measures; none that saves
+    nothing.
+    """
+    undriven = {r.name: r.saved for r in robots if not r.driven and r.saved is not None}
+    found: list[tuple[float, str, Mapping[str, float]]] = []
+    if undriven:
+        plans = sum_of(list(undriven.values()))
+        words = "driven instead of the common programs, predicted"
+        words += f", {between_of(plans.of(costs.money), costs)}" if plans.low < plans.high else ""
+        if plans.value > 0.0 and not plans.doubt:
+            energies = {name: saved.value for name, saved in undriven.items()}
+            name = f"plans that nobody drove<small>{text(words)}</small>"
+            found.append((costs.money(plans.value), name, energies))
+    above = {robot.name: robot.above for robot in robots if robot.reached is not None}
+    total = costs.money(sum(above.values()))
+    if total >= NOTHING:
+        found.append((total, "what runs took above their plans", above))
+    return found
 
 
 def _own(members: Sequence[Member], robot: Robot) -> list[Member]:
@@ -1101,6 +1151,9 @@ def fleet_columns(members: Sequence[Member]) -> dict[str, list[TableValue]]:
         rows.append((*whose, "cycle", "", cycle.seconds, cycle.energy))
         rows.append((*whose, "driven", member.month, float("nan"), member.driven))
         rows.append((*whose, "predicted", member.month, float("nan"), member.predicted))
+        if cycle.computed is not None:
+            rest = cycle.computed
+            rows.append((*whose, "computed", rest.name, rest.seconds, rest.energy))
         if cycle.savings is not None:
             total = cycle.savings.total
             rows.append((*whose, "saved", "by its plan", total.seconds, total.saved))

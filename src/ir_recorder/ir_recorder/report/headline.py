@@ -15,6 +15,7 @@ from ir_recorder.analysis.production import (
     Amount,
     Production,
     demand_watts,
+    deviation,
     driven_and_predicted,
     drives_only,
     levers,
@@ -31,15 +32,17 @@ from ir_recorder.report.costs import (
     PLANNED,
     Costs,
     IdleSaving,
+    computed_words,
     cycles_of_year,
     demand_note,
+    driven_name,
     money_of_thousand,
+    origin_of,
     recorded_idle_saving,
 )
 from ir_recorder.report.methods import counted
-from ir_recorder.report.money_text import sum_of_money, yearly_money
+from ir_recorder.report.money_text import yearly_money
 from ir_recorder.report.number_text import (
-    DASH,
     interval,
     kilograms,
     kilowatt_hours,
@@ -193,7 +196,8 @@ def tiles(analysis: Analysis, costs: Costs | None = None) -> str:
     if program is None:
         none = Tile("program", "none executed", ("figures of the whole recording only",))
         return _html([*paid, none, *driven_tiles(analysis)])
-    return _html([*paid, _unshortened(program) or _whole(analysis, program), _peak(analysis)])
+    whole = _unshortened(program, cycle) or _whole(analysis, program)
+    return _html([*paid, whole, _peak(analysis)])
 
 
 def _demand(analysis: Analysis, cycle: Production, costs: Costs) -> Tile:
@@ -201,7 +205,7 @@ def _demand(analysis: Analysis, cycle: Production, costs: Costs) -> Tile:
     return Tile(
         "largest quarter of an hour",
         watts(peak),
-        (demand_note(peak, costs), cycle.origin, cycle.supply),
+        (demand_note(peak, costs), origin_of(cycle), cycle.supply),
     )
 
 
@@ -268,6 +272,8 @@ def _without_saving(analysis: Analysis, cycle: Production, paid: Paid, costs: Co
         beside = (
             f"A part takes {kilowatt_hours(cycle.energy)}, as predicted {kilowatt_hours(planned)}."
         )
+    elif analysis.program is not None:
+        beside = _of_run(analysis, cycle)
     name = f"{cycle.name[0].upper()}{cycle.name[1:]}"
     origin = f"{name}." if cycle.origin in cycle.name else f"{name}, {cycle.origin}."
     limit = f"{cycle.supply[0].upper()}{cycle.supply[1:]}." if cycle.supply else ""
@@ -299,7 +305,7 @@ def year_in_words(
         return f"{yearly_money(shifts, costs.currency)} a year", f"In shifts: {taken}. {nights}."
     outside = yearly_money(idle.left_alone, costs.currency)
     return (
-        f"{sum_of_money((shifts, idle.left_alone), costs.currency)} a year",
+        f"{yearly_money(shifts + idle.left_alone, costs.currency)} a year",
         f"{yearly_money(shifts, costs.currency)} in shifts ({taken}), {outside} at night and at "
         "weekends, on closed brakes.",
     )
@@ -317,7 +323,7 @@ def _paid(analysis: Analysis, costs: Costs) -> Paid:
     saved = costs.saving_of_year(cycle) if cycle is not None else None
     driven = None
     if cycle is not None:
-        name = PLANNED if analysis.program is None else f"as driven, {analysis.recording.origin}"
+        name = PLANNED if analysis.program is None else driven_name(cycle)
         driven = (name, costs.energy_of_year(cycle).value)
     if cycle is None or cycle.savings is None or saved is None:
         counted = "" if cycle is None else f", {cycles_of_year(cycle.pace, costs)}"
@@ -328,15 +334,28 @@ def _paid(analysis: Analysis, costs: Costs) -> Paid:
     run = ""
     more = more_parts(cycle.savings, cycle.pace)
     if analysis.program is not None:
-        run = (
-            f"As driven ({analysis.recording.origin}) a cycle takes "
-            f"{kilowatt_hours(cycle.energy)}, as planned {kilowatt_hours(total.planned)}."
-        )
+        run = _of_run(analysis, cycle)
     else:
         driven = None
     proved = analysis.recording.only_planned and analysis.recording.planned_certified
     reached = reached_saving(saved, common, driven[1]) if driven is not None else None
     return Paid(saved, common, idle, said, COMMON, driven, cycle.supply, proved, run, more, reached)
+
+
+def _of_run(analysis: Analysis, cycle: Production) -> str:
+    """What was driven against what was predicted of it, and what of its cycle nobody drove."""
+    found, predicted = driven_and_predicted(analysis)
+    origin = analysis.recording.origin
+    said = f"The run took {kilowatt_hours(found)} ({origin})"
+    if math.isfinite(predicted):
+        said += (
+            f", {percent(deviation(found, predicted))} against the {kilowatt_hours(predicted)} "
+            "predicted of it, waits between steps included"
+        )
+    computed = computed_words(cycle)
+    if computed:
+        said += f". A cycle takes {kilowatt_hours(cycle.energy)}, {computed}"
+    return f"{said}."
 
 
 def more_parts(savings: ProgramSavings, pace: float) -> str:
@@ -453,21 +472,21 @@ def _sums(analysis: Analysis) -> tuple[float, float, float]:
     )
 
 
-def _unshortened(program: ProgramTotals) -> Tile | None:
+def _unshortened(program: ProgramTotals, cycle: Production | None) -> Tile | None:
     full = program.unshortened
     if full is None:
         return None
     cut = (
         f"pauses in power modes {seconds(full.full_pauses)}, in the run {seconds(full.run_pauses)}"
     )
-    if math.isnan(full.energy):
+    if math.isnan(full.energy) or cycle is None:
         return Tile(
             "cycle with full pauses", "not known", ("the pauses of the run don't match the cell's",)
         )
     return Tile(
         "cycle with full pauses",
         kilowatt_hours(full.energy),
-        (cut, "computed from this run and the data"),
+        (cut, computed_words(cycle)),
     )
 
 
@@ -482,7 +501,7 @@ def yearly_tile(cycle: Production, costs: Costs) -> Tile:
     )
     price = yearly_money(costs.money(energy), costs.currency)
     made = f"{cycles_of_year(cycle.pace, costs)} in shifts, without nights and weekends"
-    lines = (made, co2, assumed, cycle.supply)
+    lines = (made, co2, assumed, computed_words(cycle), cycle.supply)
     how = "planned" if cycle.origin == PREDICTED else "as driven"
     return Tile(f"costs a year in shifts, {how}", price, lines)
 
@@ -511,7 +530,7 @@ def _part(name: str, found: Share, planned: Share, whole: Share, origin: str) ->
 
 
 def _against(found: float, planned: float, origin: str) -> str:
-    return f"{origin} {percent(found / planned - 1.0)}" if planned > 0.0 else f"{origin} {DASH}"
+    return f"{origin} {percent(deviation(found, planned))}"
 
 
 def _clearance(analysis: Analysis) -> Tile:

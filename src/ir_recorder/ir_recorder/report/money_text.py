@@ -85,36 +85,6 @@ def money_of(amount: Amount, currency: str) -> str:
     return yearly_money(amount.value, currency)
 
 
-def sum_of_money(amounts: Sequence[float], currency: str) -> str:
-    """The sum of amounts of a year as they are shown, each rounded: it adds up on the page."""
-    total = together(amounts)
-    return _carried("t", amounts, f"{_yearly_digits(total)} {currency}", currency)
-
-
-def difference_of_money(more: Sequence[float], less: Sequence[float], currency: str) -> str:
-    """What some amounts of a year are more than others, each as it is shown: it is what a reader
-    finds who subtracts them; below NO_CENTS the difference itself, in words where it is next to
-    nothing.
-    """
-    amounts = [*more, *(-each for each in less)]
-    exact = sum(amounts)
-    if not math.isfinite(exact) or abs(exact) < NOTHING:
-        return yearly_money(exact, currency)
-    shown = together(amounts) if abs(exact) >= NO_CENTS else exact
-    return _carried("d", amounts, f"{_yearly_digits(shown)} {currency}", currency)
-
-
-def together(amounts: Sequence[float]) -> float:
-    """The sum of amounts of a year, each rounded as it is shown."""
-    return sum(_rounded(each) for each in amounts)
-
-
-def _rounded(value: float) -> float:
-    if not math.isfinite(value):
-        return value
-    return round(value, 0 if abs(value) >= NO_CENTS else 2)
-
-
 def yearly_span(low: float, high: float, currency: str, least: float = NOTHING) -> str:
     """The ends of an amount of a year, without its currency: both whole where one is shown so; 0
     for one below `least`.

@@ -12,6 +12,7 @@ from ir_description import load_power_data
 from ir_msgs_py.savings import ProgramPoint
 from ir_recorder.analysis import Analysis, Finding, Tolerances
 from ir_recorder.analysis.indirect import agreement
+from ir_recorder.analysis.production import production_of
 from ir_recorder.report.bars import joule_bars
 from ir_recorder.report.charts import front_section
 from ir_recorder.report.costs import (
@@ -21,6 +22,7 @@ from ir_recorder.report.costs import (
     costs_section,
     following_price,
     lever_section,
+    own_pace,
 )
 from ir_recorder.report.data import page_data
 from ir_recorder.report.files import write_output
@@ -140,6 +142,7 @@ def report_html(
         "around": rest if planned else folded(rest, paper=True),
         "line": folded(line_section(of_recording(analysis, prices), prices)),
         "engineers": _engineers(analysis, checks, joules(controller.dc_link_capacity_energy)),
+        "pace": _pace(analysis),
         "unmoved": "" if _moves(analysis) else " hidden",
         "style": asset("page.css"),
         "data": data,
@@ -163,6 +166,12 @@ def _subject(analysis: Analysis) -> str:
     if not analysis.recording.never_driven:
         return "the recorded run"
     return "what the plan costs" if analysis.savings is None else "what the plan saves"
+
+
+def _pace(analysis: Analysis) -> str:
+    """That the motion is not at the pace that the money is of; "" elsewhere."""
+    words = own_pace(production_of(analysis))
+    return f'<p class="hint">{text(words)}</p>' if words else ""
 
 
 def _moves(analysis: Analysis) -> bool:

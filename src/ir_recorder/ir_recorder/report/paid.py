@@ -23,10 +23,8 @@ from ir_recorder.report.costs import (
 )
 from ir_recorder.report.money_text import (
     NOTHING,
-    difference_of_money,
     money_of,
     price_field,
-    sum_of_money,
     yearly_money,
     yearly_span,
 )
@@ -101,7 +99,7 @@ class Paid:
         energy = year.with_energy(costs)
         share = (
             f"{percent_of(gain.value, sum(before))} of the "
-            f"{sum_of_money(before, costs.currency)} of the {self.before}"
+            f"{yearly_money(sum(before), costs.currency)} of the {self.before}"
         )
         said = (share, f"{energy} {less}" if energy else "", payback(year.money, costs), self.more)
         result = f"{self.gain_words(costs)} {less} a year"
@@ -140,22 +138,8 @@ class Paid:
         return [(Amount.of_value(costs.money(above)), ABOVE)]
 
     def gain_words(self, costs: Costs) -> str:
-        """What is saved of a year in all, or taken more, in money: as the table of changes adds it
-        up, and where a run was driven as the bars say it.
-        """
-        if self.driven is None:
-            return yearly_money(abs(self.year(costs).money.value), costs.currency)
-        before = self.before_amounts(costs)
-        then = self._then(costs)
-        if sum(before) < sum(then):
-            before, then = then, before
-        return difference_of_money(before, then, costs.currency)
-
-    def reached_money(self, costs: Costs) -> str:
-        """What was reached, in money, as the bars of a year say it; it must be known."""
-        assert self.driven is not None
-        shifts = costs.money(self.common), costs.money(self.driven[1])
-        return difference_of_money(shifts[:1], shifts[1:], costs.currency)
+        """What is saved of a year in all, or taken more, in money."""
+        return yearly_money(abs(self.year(costs).money.value), costs.currency)
 
     def reached_words(self, costs: Costs) -> str:
         """How much of a saving was driven: "105 EUR of 323 EUR a year reached"."""
@@ -164,7 +148,7 @@ class Paid:
         mine = costs.money(reached.value)
         if mine < NOTHING:
             return f"Nothing of {self.gain_words(costs)} a year reached"
-        shown = self.reached_money(costs)
+        shown = yearly_money(mine, costs.currency)
         if self.year(costs).money.value - mine < NOTHING:
             return f"{shown} less a year: reached"
         return f"{shown} of {self.gain_words(costs)} a year reached"
@@ -223,26 +207,25 @@ class Paid:
         assert self.saved is not None
         before = self.before_amounts(costs)
         then = self._then(costs)
-        rows = [_year_row(self.before, "today", before, costs)]
-        now = before
+        rows = [_year_row(self.before, "today", before, costs, ON_BRAKES)]
         if self.driven is not None:
             name, energy = self.driven
             now = costs.money(energy), before[1]
-            rows.append(_year_row(name, "driven", now, costs))
-        rows.append(_year_row(planned_name(self.before), "planned", then, costs))
+            rows.append(_year_row(name, "driven", now, costs, ON_BRAKES))
+        mode = "" if self.idle is None else f"in {self.idle.mode}"
+        rows.append(_year_row(planned_name(self.before), "planned", then, costs, mode))
         saved = self.year(costs).money
         reached = self.has_reached
         idle = 0.0 if self.idle is None else self.idle.saved
         if reached is not None:
             mine = reached.of(costs.money)
             if mine.value >= NOTHING:
-                rows.append(_saved_row(REACHED, mine, 0.0, self.reached_money(costs), costs))
+                rows.append(_saved_row(REACHED, mine, 0.0, costs))
             left = Amount(saved.value - mine.value, saved.low - mine.low, saved.high - mine.high)
             if left.value >= NOTHING:
-                price = difference_of_money(now, then, costs.currency)
-                rows.append(_saved_row(LEFT, left, min(idle, left.value), price, costs))
+                rows.append(_saved_row(LEFT, left, min(idle, left.value), costs))
         elif saved.value > 0.0:
-            rows.append(_saved_row(SAVED, saved, idle, self.gain_words(costs), costs))
+            rows.append(_saved_row(SAVED, saved, idle, costs))
         return rows
 
     def _rows_of_nights(self, costs: Costs) -> list[Row]:
@@ -253,9 +236,9 @@ class Paid:
         idle = self.idle
         shifts = costs.money(energy)
         return [
-            _year_row(name, "driven", (shifts, idle.left_alone), costs),
+            _year_row(name, "driven", (shifts, idle.left_alone), costs, ON_BRAKES),
             _year_row(f"with {idle.mode} at night", "planned", (shifts, idle.deepest), costs),
-            _saved_row(LEFT, idle.money, idle.saved, _less(idle, costs), costs),
+            _saved_row(LEFT, idle.money, idle.saved, costs),
         ]
 
     def year(self, costs: Costs) -> SavedYear:
@@ -268,6 +251,8 @@ def planned_name(before: str) -> str:
     return f"{PLANNED}s" if before.endswith("programs") else PLANNED
 
 
+ON_BRAKES = "on closed brakes"
+"""How a robot rests outside of the shifts where nobody puts it into another mode."""
 KEEP = "Keep the program as it is."
 
 
@@ -295,15 +280,9 @@ def counted_at(costs: Costs) -> str:
     )
 
 
-def _less(idle: IdleSaving, costs: Costs) -> str:
-    """What rest saves, as the bars of a year say it."""
-    return difference_of_money([idle.left_alone], [idle.deepest], costs.currency)
-
-
-def _saved_row(name: str, saved: Amount, nights: float, price: str, costs: Costs) -> Row:
-    """What is saved of a year, with the whisker of its interval; nights: outside of shifts; price:
-    in words.
-    """
+def _saved_row(name: str, saved: Amount, nights: float, costs: Costs) -> Row:
+    """What is saved of a year, with the whisker of its interval; nights: outside of shifts."""
+    price = yearly_money(saved.value, costs.currency)
     pieces = (
         Piece("saved", f"{name} in shifts", saved.value - nights),
         Piece("saved night", f"{name} at night and at weekends", nights),
@@ -386,15 +365,16 @@ def _year_row(
     style: str,
     money: tuple[float, float],
     costs: Costs,
+    rests: str = "",
 ) -> Row:
-    """A bar of a year: money in shifts, and outside of them."""
+    """A bar of a year: money in shifts, and outside of them; rests: how, in words."""
     shifts, nights = (yearly_money(each, costs.currency) for each in money)
     pieces = [Piece(style, "in shifts", money[0])]
     parts = ""
     if money[1] > 0.0:
         pieces.append(Piece(f"{style} night", "at night and at weekends", money[1]))
-        parts = f"{shifts} in shifts, {nights} outside"
-    price = sum_of_money(money, costs.currency)
+        parts = f"{shifts} in shifts, {nights} outside {rests}".rstrip()
+    price = yearly_money(sum(money), costs.currency)
     return Row(name, tuple(pieces), price, (parts,))
 
 

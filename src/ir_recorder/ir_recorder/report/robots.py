@@ -13,6 +13,7 @@ import numpy as np
 from ir_recorder.analysis import Analysis, Finding
 from ir_recorder.analysis.production import (
     Production,
+    deviation,
     idle_watts,
     largest_quarter,
     production_of,
@@ -51,6 +52,7 @@ from ir_recorder.report.number_text import (
     kilograms,
     kilowatt_hours,
     number,
+    percent,
     seconds,
     text,
     watt_hours,
@@ -117,7 +119,7 @@ def _answer(
         sure.insert(
             0,
             f"One {next(iter(every)).recording.origin} run: "
-            f"{100.0 * (driven / predicted - 1.0):+.1f} % against the plan, which knows no waits "
+            f"{percent(deviation(driven, predicted))} against the plan, which knows no waits "
             "for signals.",
         )
     if cycle is None:

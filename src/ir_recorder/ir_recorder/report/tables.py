@@ -12,7 +12,14 @@ from ir_recorder.analysis import Analysis, Finding, Verdict
 from ir_recorder.analysis.checks import row_name
 from ir_recorder.analysis.indirect import Agreement
 from ir_recorder.analysis.predicted_power import recorded_power_data
-from ir_recorder.analysis.production import OPEN, production_of, saved_amount
+from ir_recorder.analysis.production import (
+    OPEN,
+    SLOWER,
+    Production,
+    deviation,
+    production_of,
+    saved_amount,
+)
 from ir_recorder.analysis.results import Share, StepResult
 from ir_recorder.analysis.steps import step_label
 from ir_recorder.format import contents
@@ -73,7 +80,7 @@ def step_table(analysis: Analysis) -> str:
     was not driven with its certificate.
     """
     if not analysis.steps and analysis.recording.planned:
-        return _planned_table(analysis.recording.planned)
+        return _planned_table(analysis.recording.planned, production_of(analysis))
     found = f">{analysis.recording.origin}"
     heads = (
         "#",
@@ -90,11 +97,12 @@ def step_table(analysis: Analysis) -> str:
     return table((*heads, ">tool deviation"), rows, "Steps of the program")
 
 
-def _planned_table(steps: Sequence[PlannedMovement]) -> str:
+def _planned_table(steps: Sequence[PlannedMovement], cycle: Production | None) -> str:
+    """The steps, and where the plan's money is of another time than theirs what lies between."""
     heads = (
         "#", "step", "load", ">time", ">predicted", ">mean power", ">clearance", "certificate"
     )  # fmt: skip
-    rows = (
+    rows: list[tuple[str, ...]] = [
         (
             str(place),
             text(modes_as_words(step_label(step))),
@@ -107,8 +115,19 @@ def _planned_table(steps: Sequence[PlannedMovement]) -> str:
         )
         for place, step in enumerate(steps, start=1)
         if step.duration > 0.0
-    )
+    ]
+    if cycle is not None and cycle.own is not None:
+        more = (cycle.seconds - cycle.own.seconds, cycle.energy - cycle.own.energy)
+        rows.append(_sum_row("steps as fast as pays", cycle.own.seconds, cycle.own.energy))
+        rows.append(_sum_row(SLOWER, *more))
+        rows.append(_sum_row("cycle that the money is of", cycle.seconds, cycle.energy))
     return table(heads, rows, "Steps of the plan")
+
+
+def _sum_row(name: str, time: float, energy: float) -> tuple[str, ...]:
+    """A row below the steps."""
+    shown = (seconds(time), f"<b>{joules(energy)}</b>")
+    return (DASH, f"<b>{text(name)}</b>", DASH, *shown, DASH, DASH, DASH)
 
 
 def _certificate(step: PlannedMovement) -> str:
@@ -132,7 +151,7 @@ def _step(result: StepResult) -> tuple[str, ...]:
         f"{result.seconds:.2f} s",
         joules(plan) + _predicted(step.movement.report) if plan else DASH,
         joules(result.energy) + _small("from positions", joules(result.indirect_energy)),
-        percent(result.energy / plan - 1.0) if plan else DASH,
+        percent(deviation(result.energy, plan)),
         watts(result.mean_power) + _small("peak", watts(result.peak_power)),
         f"{millimetres(near.least)}<small>{text(near.least_pair)}</small>" if near else DASH,
         millimetres(result.tool_deviation),

@@ -15,16 +15,10 @@ const Amounts = (() => {
   const cents = (value) => `${value < 0 && Math.abs(value) >= 0.005 ? "-" : ""}${Math.abs(value).toFixed(2)}`;
   const digits = (value) => Math.abs(value) >= 10 ? fixed(value, 0) : Math.abs(value) >= 1 ? cents(value) : significant(value, Math.abs(value) >= 0.001 ? 3 : 2);
   const yearly = (value) => Math.abs(value) < 1 ? cents(value) : digits(value);
-  const rounded = (value) => Math.abs(value) >= 10 ? Math.round(value) : Math.round(value * 100) / 100;
   const rules = {
     m: ([value]) => digits(value),
     y: ([value]) => yearly(value),
     o: ([value, most]) => most >= 10 ? fixed(value, 0) : yearly(value),
-    t: (values) => yearly(values.reduce((sum, value) => sum + rounded(value), 0)),
-    d: (values) => {
-      const exact = values.reduce((sum, value) => sum + value, 0);
-      return yearly(Math.abs(exact) >= 10 ? values.reduce((sum, value) => sum + rounded(value), 0) : exact);
-    },
     s: ([low, high], least) => {
       const show = (value) => Math.max(Math.abs(low), Math.abs(high)) >= 10 ? fixed(value, 0) : Math.abs(value) < least ? "0" : least === 0.01 ? cents(value) : digits(value);
       return `${show(low)} to ${show(high)}`.replace(/(\d) (?=\d)/g, "$1\u00a0");
