@@ -14,11 +14,12 @@ from rclpy.parameter import Parameter
 from ir_description import load_cell
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs_py import names
+from ir_msgs_py.ros import goal_clients
 from ir_msgs_py.ros.conversions import trajectory_to_msg
+from ir_msgs_py.ros.goal_clients import ClientWatch
 from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.node import SimDriver
-from ir_sim_driver.node.trajectory_actions import ClientWatch
 
 
 @pytest.fixture
@@ -63,7 +64,7 @@ def test_a_movement_whose_client_has_gone_is_stopped_though_others_are_there(
     wait_for(another.server_is_ready)
 
     def processes() -> int:
-        return len({each[:12] for each in driver.clients_of(names.EXECUTE_TRAJECTORY)})
+        return len({each[:12] for each in driver._actions[0]._clients.now()})
 
     context = Context()
     rclpy.init(context=context, domain_id=ros_domain_id)
@@ -93,6 +94,23 @@ def test_a_client_counts_by_its_process_once_that_is_known() -> None:
     assert not ClientWatch(1e-9).gone([other + b"feed"])  # a middleware that names nobody
     assert ClientWatch(1e-9, own).gone([])
     assert not ClientWatch(0.0, own).gone([])
+
+
+def test_a_watch_that_was_held_up_itself_does_not_take_that_for_an_absence(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now = [100.0]
+    monkeypatch.setattr(goal_clients.time, "monotonic", lambda: now[0])
+    watch = ClientWatch(2.0, b"p" * 12)
+    assert not watch.gone([b"p" * 12])
+    now[0] += 15.0  # the graph has forgotten its client meanwhile, and finds it again
+    assert not watch.gone([])
+    now[0] += 0.2
+    assert not watch.gone([b"p" * 12])
+    for _ in range(3):
+        now[0] += 1.0
+        left = watch.gone([])
+    assert left
 
 
 def test_a_client_that_never_shows_in_the_graph_counts_as_gone_whoever_else_is_there() -> None:

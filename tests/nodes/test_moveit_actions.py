@@ -211,3 +211,18 @@ def test_a_stop_while_it_is_driven_ends_it_with_the_words_of_the_controller() ->
     status = executor.drive(TRAJECTORY, executor.accept())
     assert status.code == StatusCode.PREEMPTED
     assert status.message == "stopped along the path: emergency stop"
+
+
+def test_goals_whose_clients_have_gone_are_stopped_and_no_others(
+    execution: TrajectoryExecution,
+) -> None:
+    goals = AcceptedGoals(execution)
+    there = dict.fromkeys((b"a" * 16, b"b" * 16), True)
+    handles = {name: Of(goal_id=Of(uuid=name)) for name in there}
+    for name, handle in handles.items():
+        goals.add(handle, lambda name=name: not there[name])
+    assert goals.stop_abandoned() == 0
+    there[b"a" * 16] = False
+    assert goals.stop_abandoned() == 1
+    assert [goals.stopped(each).canceled for each in handles.values()] == [True, False]
+    assert goals.stop_abandoned() == 0

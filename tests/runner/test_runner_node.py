@@ -505,6 +505,46 @@ def test_a_cancel_in_a_pause_takes_the_bit_back(cell, wait_for):
     assert cell.driver.log[-2:] == ["ab=1", "end_ab=1"]
 
 
+@pytest.mark.parametrize(
+    ("steps", "there", "left"),
+    [
+        ([move(LONG), move()], "drive", "stopped"),
+        ([pause(600.0, "BUS_POWER_OFF"), move()], "ab=1", "end_ab=1"),
+        ([move(wait_for=["door=1"])], "end_hib=1", "end_hib=1"),
+    ],
+    ids=["a movement", "a pause", "a signal that does not come"],
+)
+def test_a_program_whose_client_has_gone_ends_as_one_that_is_canceled(
+    steps, there, left, ros_context, ros_executor, wait_for
+):
+    cell = Cell(ros_context, ros_executor, client_timeout=0.3)
+    goal = RunProgram.Goal(movements=[planned_movement_to_msg(each) for each in steps])
+    wait_for(cell.sender.server_is_ready)
+    accepted = ros_executor.run(lambda: cell.sender.send_goal_async(goal))
+    wait_for(accepted.done)
+    wait_for(lambda: cell.driver.log[-1:] == [there])
+    ros_executor.run(cell.sender.destroy)
+    wait_for(lambda: cell.runner._progress is None, what="the program ends")
+    assert cell.driver.log[-1] == left
+    said = cell.runner._last
+    assert said.code == StatusCode.PREEMPTED
+    assert said.message.startswith("the program has had no client for 0.3 s: canceled in step 1")
+    cell.driver.log.clear()
+    assert cell.run(program_id="known").status.code == StatusCode.SUCCESS
+    cell.client.close()
+
+
+def test_a_program_may_outlive_its_client(ros_context, ros_executor, wait_for):
+    cell = Cell(ros_context, ros_executor, client_timeout=0.0)
+    goal = RunProgram.Goal(program_id="known")
+    wait_for(cell.sender.server_is_ready)
+    accepted = ros_executor.run(lambda: cell.sender.send_goal_async(goal))
+    wait_for(accepted.done)
+    ros_executor.run(cell.sender.destroy)
+    wait_for(lambda: cell.events()[-1:] == ["1 ended"], what="the program runs to its end")
+    cell.client.close()
+
+
 def test_the_drivers_abort_ends_the_program_with_its_sentence(cell, wait_for):
     cell.driver.answer = ExecuteTrajectory.Result(
         error_code=-4, error_string="joint_a2 is 0.2 rad off its path"

@@ -14,6 +14,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import serialize_message
+from rclpy.timer import Timer
 
 from ir_description import DescriptionError, load_cell
 from ir_msgs.action import RunProgram
@@ -121,6 +122,7 @@ small.
 _MOST_STATE = 65_536  # bytes that a step announces; a planned one has two thousand
 _SIGNALS = COMMANDS[0]  # a driver that starts later hears them too
 _FEEDBACK_PERIOD = 0.2  # s: a person reads no faster
+_CLIENT_PERIOD = 0.2  # s between two looks whether the program's client is there
 _MACHINES_PERIOD = 0.02  # s: cycle of the soft PLC, as a small real one has
 
 
@@ -236,7 +238,9 @@ class ProgramRunnerNode(Node):
         self._progress = progress = RunProgress(
             goal.request.program_id, (), self._driver.plant_time
         )
-        after_stop = self._known_stops.pop(bytes(goal.goal_id.uuid), self._driver.stops)
+        goal_id = bytes(goal.goal_id.uuid)
+        after_stop = self._known_stops.pop(goal_id, self._driver.stops)
+        watch = self._watch_client(goal_id, progress)
         try:
             status, movements = await self._fetch(goal.request)
             # a driver or a /clock that has just been started gets the time to be discovered
@@ -255,8 +259,25 @@ class ProgramRunnerNode(Node):
                 result = await self._run_steps(goal, program, after_stop)
         finally:
             self._progress = None
+            self.destroy_timer(watch)
+        if progress.abandoned and result.status.code == StatusCode.PREEMPTED:
+            sentence = f"{progress.abandoned}: {result.status.message}"
+            result = ProgramResult(Status(StatusCode.PREEMPTED, sentence), result.executed)
         duration = self._driver.plant_time - progress.started
         return self._end(goal, result, duration, self._driver.energy - energy)
+
+    def _watch_client(self, goal_id: bytes, progress: RunProgress) -> Timer:
+        """A timer that abandons the program when its client has gone."""
+        timeout = self._settings.links.value.client_timeout
+        gone = self._server.watch(goal_id, timeout)
+
+        def look() -> None:
+            if not progress.abandoned and gone():
+                progress.abandoned = f"the program has had no client for {timeout:g} s"
+                self._waiting.look()
+
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        return self.create_timer(_CLIENT_PERIOD, look, clock=steady)
 
     def _driver_is_known(self) -> bool:
         """Whether the meter and the last stop have been heard, and time passes."""
@@ -298,7 +319,7 @@ class ProgramRunnerNode(Node):
             machines=self._machines,
             until=self._waiting.until,
             fault=lambda: self._jump,
-            canceled=lambda: bool(goal.is_cancel_requested),
+            canceled=lambda: self._is_canceled(goal),
             begin=self._begin,
             done=self._done,
             announce=self._announce,
@@ -306,6 +327,11 @@ class ProgramRunnerNode(Node):
             set_signal=self._set_signal,
             send_wake_packet=self._send_wake_packet,
         )
+
+    def _is_canceled(self, goal: ServerGoalHandle) -> bool:
+        """Whether its client has canceled the program, or has gone."""
+        abandoned = self._progress is not None and self._progress.abandoned
+        return bool(goal.is_cancel_requested or abandoned)
 
     def _plant_time(self) -> float | None:
         """Time of the plant [s], None where no driver is heard: machines answer without one."""

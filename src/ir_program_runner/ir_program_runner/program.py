@@ -294,7 +294,7 @@ class Program:
 @dataclass
 class RunProgress:
     """State of one run; times of the plant [s]; step_done_ns: stamp of the end of the step, 0 while
-    it goes on.
+    it goes on. abandoned: why nobody waits for its end any more, "" while somebody does.
     """
 
     program_id: str
@@ -304,6 +304,7 @@ class RunProgress:
     phase: str = ""
     step_started: float | None = None
     step_done_ns: int = 0
+    abandoned: str = ""
 
     @property
     def total(self) -> int:

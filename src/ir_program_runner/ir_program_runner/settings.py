@@ -108,6 +108,15 @@ class LinkSettings:
         maximum=60.0,
         read_only=True,
     )
+    client_timeout: float = setting(
+        2.0,
+        "How long a program goes on when the client that asked for it has left the graph; 0: to "
+        "its end.",
+        unit="s",
+        minimum=0.0,
+        maximum=_HOUR,
+        read_only=True,
+    )
 
     def __post_init__(self) -> None:
         check_settings(self)

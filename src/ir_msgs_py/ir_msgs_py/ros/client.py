@@ -389,7 +389,7 @@ class Client:
         self.graph = Graph(self.node)
 
     def close(self) -> None:
-        """Let go of everything; a goal under way goes on."""
+        """Let go of everything; the nodes end a goal that is under way, as its client has gone."""
         self._executor.run(self._goals.destroy)
         self._executor.close()
         if self._own_context:

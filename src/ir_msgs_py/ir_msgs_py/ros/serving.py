@@ -28,12 +28,14 @@ from rclpy.waitable import NumberOfEntities, Waitable
 from ir_msgs.msg import RecordedCall
 from ir_msgs_py import names
 from ir_msgs_py.ros.conversions import status_to_msg
+from ir_msgs_py.ros.goal_clients import ActionClients, Gone
 from ir_msgs_py.ros.messages import type_name
 from ir_msgs_py.ros.rclpy_inside import (
     PatientActionServer,
     can_take_requests,
     client_of,
     forget_request,
+    participant_of,
     patient_sender,
     readers,
     send_to_whoever_is_left,
@@ -201,7 +203,6 @@ def unexpected(error: BaseException) -> Status:
 
 
 Handler = Callable[..., Any]
-Gone = Callable[[], bool]
 
 
 def with_status(response: Any, status: Status) -> None:
@@ -355,7 +356,8 @@ class TakenGoals(Generic[T]):
 
 
 class RecordedActionServer(PatientActionServer):
-    """An action server whose goals and results are published for recordings.
+    """An action server whose goals and results are published for recordings, and that watches the
+    clients of its goals.
 
     came: is told the id of a goal when it is taken from the middleware, also by `take_waiting`,
     which may be long before it is accepted.
@@ -371,14 +373,24 @@ class RecordedActionServer(PatientActionServer):
         **options: Any,
     ) -> None:
         self._came = came
+        self._senders = TakenGoals[bytes]()
+        self._clients = ActionClients(node, name)
         self._calls = Calls.of(node)
         self._type_text = type_name(action_type)
         self._full_name = node.resolve_topic_name(name)
         super().__init__(node, action_type, name, *arguments, **options)
 
     def goal_came(self, request_id: Any, request: Any) -> None:
-        """Tell of the goal."""
-        self._came(bytes(request.goal_id.uuid))
+        """Note who has sent the goal, and tell of it."""
+        key = bytes(request.goal_id.uuid)
+        self._senders.note(key, participant_of(request_id))
+        self._came(key)
+
+    def watch(self, goal_id: bytes, timeout: float) -> Gone:
+        """Whether the client of a goal has been gone for `timeout` [s], from now on; 0: never. To
+        be asked for once, and looked at again and again.
+        """
+        return self._clients.watch(timeout, self._senders.pop(goal_id, b""))
 
     def register_execute_callback(self, execute_callback: Any) -> None:
         """Let a goal be executed by this callback where it names none."""

@@ -18,6 +18,7 @@ import numpy as np
 from rclpy.action import CancelResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
@@ -83,6 +84,7 @@ from ir_values.errors import (
 )
 
 _THREADS = 8  # long and quick requests, scenes, topics, two goals, cancelling, a spare
+_CLIENT_PERIOD = 0.2  # s between two looks whether the clients of goals are there
 _GOALS_WAITING = 100  # of an action; beyond, a client is in a loop
 _PATIENCE = 10.0  # s for an answer beside the planning time
 _PAIRS = 20  # of a state that are looked at
@@ -517,15 +519,25 @@ class MoveItNode(Node):
 
         goals = GoalQueue(execute, refuse, _GOALS_WAITING)
 
+        timeout = self._settings.value.client_timeout
+
         def accept(goal: ServerGoalHandle) -> None:
-            accepted.add(goal)
+            accepted.add(goal, server.watch(bytes(goal.goal_id.uuid), timeout))
             goals.accepted(goal)
+
+        def look_for_clients() -> None:
+            count = accepted.stop_abandoned()
+            if count:
+                self.get_logger().warning(
+                    f"{count} goals of {ACTIONS[kind]} have had no client for {timeout:g} s: "
+                    "stopped"
+                )
 
         def cancel(goal: ServerGoalHandle) -> CancelResponse:
             accepted.cancel(goal)
             return goals.cancel(goal)
 
-        return RecordedActionServer(
+        server = RecordedActionServer(
             self,
             action_type,
             ACTIONS[kind],
@@ -536,6 +548,13 @@ class MoveItNode(Node):
             callback_group=ReentrantCallbackGroup(),
             **ACTION_SERVICES,
         )
+        self.create_timer(
+            _CLIENT_PERIOD,
+            look_for_clients,
+            MutuallyExclusiveCallbackGroup(),
+            clock=Clock(clock_type=ClockType.STEADY_TIME),
+        )
+        return server
 
     def _execute(
         self, goal: Any, result: Any, stopped: Cancellation, feedback: Callable[[str], None]

@@ -12,6 +12,7 @@ from time import monotonic, sleep
 from typing import Any
 from weakref import WeakSet
 
+from ir_msgs_py.ros.goal_clients import Gone
 from ir_msgs_py.ros.serving import TakenGoals
 from ir_msgs_py.ros.spinning import Cancellation
 from ir_msgs_py.status import Status, StatusCode
@@ -105,15 +106,17 @@ class TrajectoryExecution:
 
 @dataclass(eq=False)
 class _Accepted:
-    """What cancels a goal, and whether its client has."""
+    """What cancels a goal, and whether its client has, or has gone."""
 
     stopped: Cancellation
+    gone: Gone
     by_client: bool = False
 
 
 class AcceptedGoals:
     """Goals of an action server of rclpy from when they are accepted until they end: canceled by
-    their clients, or all by a stop. A goal's handle has no hash: its id tells it from others.
+    their clients or because these have gone, or all by a stop. A goal's handle has no hash: its id
+    tells it from others.
     """
 
     def __init__(self, executor: TrajectoryExecution) -> None:
@@ -125,11 +128,20 @@ class AcceptedGoals:
         """A goal is taken from the middleware: a stop that is heard from now on ends it."""
         self._taken.note(goal_id, self._executor.accept())
 
-    def add(self, goal: Any) -> None:
-        """A goal is accepted."""
+    def add(self, goal: Any, gone: Gone = lambda: False) -> None:
+        """A goal is accepted; gone: whether its client has gone."""
         key = bytes(goal.goal_id.uuid)
         stopped = self._taken.pop(key, None)
-        self._goals[key] = _Accepted(self._executor.accept() if stopped is None else stopped)
+        self._goals[key] = _Accepted(self._executor.accept() if stopped is None else stopped, gone)
+
+    def stop_abandoned(self) -> int:
+        """Stop the goals whose clients have gone, those that wait too; how many there are now."""
+        count = 0
+        for each in tuple(self._goals.values()):
+            if not each.stopped.canceled and each.gone():
+                each.stopped.cancel()
+                count += 1
+        return count
 
     def stopped(self, goal: Any) -> Cancellation:
         """What cancels it."""

@@ -70,6 +70,15 @@ class MoveItSettings:
         minimum=0.01,
         maximum=60.0,
     )
+    client_timeout: float = setting(
+        2.0,
+        "How long a goal of an action goes on when the client that sent it has left the graph; 0: "
+        "to its end.",
+        unit="s",
+        minimum=0.0,
+        maximum=3600.0,
+        read_only=True,
+    )
 
     def __post_init__(self) -> None:
         check_settings(self)

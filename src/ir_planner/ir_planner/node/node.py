@@ -73,6 +73,7 @@ from ir_planner.settings import PlannerSettings
 from ir_values.errors import InvalidValueError, IrError
 
 _PUBLISHERS = 16  # of joint_states beside the robot's, without pushing its message out
+_CLIENT_TIMEOUT = 1.0  # s for which a plan goes on when its client has gone
 _GOALS_WAITING = 100  # beyond, a client is in a loop: each takes seconds
 # quick and long requests, texts and points, changes, standby, the goal, cancelling, a spare
 _THREADS = 8
@@ -176,7 +177,9 @@ class PlannerNode(Node):
         )
 
     def _execute_plan(self, goal: ServerGoalHandle) -> Plan.Result:
-        """plan_program with feedback; a cancel ends it at the next step."""
+        """plan_program with feedback; a cancel ends it at the next step, and so does the end of its
+        client.
+        """
 
         def progress(phase: str, done: int, total: int, best_cost: float) -> None:
             cost = float(best_cost) if np.isfinite(best_cost) else 0.0
@@ -184,11 +187,14 @@ class PlannerNode(Node):
                 Plan.Feedback(phase=phase, done=done, total=total, best_cost=cost)
             )
 
+        gone = self._action.watch(bytes(goal.goal_id.uuid), _CLIENT_TIMEOUT)
+
+        def cancelled() -> bool:
+            return bool(goal.is_cancel_requested) or gone()
+
         ask = self._requests
         plan = ask.guarded(
-            lambda request, result: ask.plan_program(
-                request, result, lambda: bool(goal.is_cancel_requested), progress
-            )
+            lambda request, result: ask.plan_program(request, result, cancelled, progress)
         )
         result = plan(goal.request, Plan.Result())
         if result.status.code == StatusCode.SUCCESS:

@@ -35,8 +35,9 @@ from ir_msgs.srv import (
 )
 from ir_msgs_py.names import PLANNER
 from ir_msgs_py.ros.conversions import trajectory_to_msg
+from ir_msgs_py.ros.goal_clients import Gone
 from ir_msgs_py.ros.search_conversions import searches_to_msg
-from ir_msgs_py.ros.serving import Gone, answered, unexpected
+from ir_msgs_py.ros.serving import answered, unexpected
 from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
 from ir_msgs_py.trajectory import JointTrajectory

@@ -25,9 +25,8 @@ from ir_msgs_py.ros.rclpy_inside import (
     converter,
     lookalike,
     part,
-    participant_of,
 )
-from ir_msgs_py.ros.serving import RecordedActionServer, TakenGoals
+from ir_msgs_py.ros.serving import RecordedActionServer
 
 _NAMES_MAX = 100  # joints, tolerances and states of a goal: a robot has ten
 _AT_ONCE = 50  # points that are converted without a pause for other threads, half a millisecond
@@ -186,7 +185,6 @@ class BoundedActionServer(RecordedActionServer):
 
     def __init__(self, node: Any, action_type: Any, *arguments: Any, admit: Admit, **options: Any):
         self._admissions: dict[bytes, Admission] = {}
-        self._clients = TakenGoals[bytes]()
         self._counted = _CountedRequest(
             action_type.Impl.SendGoalService.Request, admit, self._is_known
         )
@@ -199,18 +197,14 @@ class BoundedActionServer(RecordedActionServer):
         """Ticket or refusal of a goal. Asked once."""
         return self._admissions.pop(goal_id, Admission())
 
-    def client_of(self, goal_id: bytes) -> bytes:
-        """Participant of who has sent a goal; b"" where it is not known. Asked once."""
-        return self._clients.pop(goal_id, b"")
-
     def goal_class(self) -> Any:
         """The counting class."""
         return self._counted.as_class
 
     def goal_came(self, request_id: Any, request: Any) -> None:
         """Note who has sent the goal, and what the driver said of it."""
+        super().goal_came(request_id, request)
         key = bytes(request.goal_id.uuid)
-        self._clients.note(key, participant_of(request_id))
         if self._counted.admission != Admission():
             self._admissions[key] = self._counted.admission
 

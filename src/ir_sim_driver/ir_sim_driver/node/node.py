@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -83,7 +83,6 @@ _DIAGNOSTICS_PERIOD = 1.0
 _TRANSFORMS_PERIOD = 0.02
 _LINES_MAX = 20  # of the log per second: who toggles a bit all day must not fill a disk
 _RESULT_KEPT = 60  # s that the result of a goal can be asked for; each takes memory
-_GRAPH_PERIOD = 0.2  # s between two looks who is there: each takes a millisecond
 _LAST_WORDS = 1.0  # s for the answers to goals when the plant has stopped
 REFUSALS = (DriverError, IrError)
 _LOOK = 1.0  # s between two looks whether the plant runs: each delays its thread
@@ -116,7 +115,6 @@ class SimDriver(Node):
         self._hardware = hardware_id(simulation.robot)
         self._joints: Joints | None = None
         self._last_words = 0.0
-        self._action_clients: dict[str, tuple[float, tuple[bytes, ...]]] = {}
         self._open_topics()
         self._open_requests()
         self._links = open_links(self._configuration.links, self._driver)
@@ -208,7 +206,7 @@ class SimDriver(Node):
 
     def _serve_action(self, action_type: Any, name: str) -> BoundedActionServer:
         executions = Executions(
-            self._driver, self, action_type, name, self._configuration.node.client_timeout
+            self._driver, self, action_type, self._configuration.node.client_timeout
         )
 
         def cancel(handle: Any) -> CancelResponse:
@@ -226,7 +224,7 @@ class SimDriver(Node):
             **ACTION_SERVICES,
         )
         executions.admission_of = server.admission_of
-        executions.client_of = server.client_of
+        executions.watch = server.watch
         return server
 
     def _tell_stop(self) -> int:
@@ -279,22 +277,6 @@ class SimDriver(Node):
         """Let the executor look at its futures."""
         if self.executor is not None:
             self.executor.wake()
-
-    def clients_of(self, action: str) -> Sequence[bytes]:
-        """Identities of the clients of an action in the graph, of the last _GRAPH_PERIOD: who
-        hears the answers to goals, as whoever sends one does, or the feedback.
-        """
-        now = time.monotonic()
-        seen, there = self._action_clients.get(action, (-_GRAPH_PERIOD, ()))
-        if now - seen >= _GRAPH_PERIOD:
-            service = self.resolve_service_name(f"{action}/_action/send_goal")
-            found = [
-                *self.get_subscriptions_info_by_topic(f"rr{service}Reply", no_mangle=True),
-                *self.get_subscriptions_info_by_topic(f"{action}/_action/feedback"),
-            ]
-            there = tuple(bytes(each.endpoint_gid) for each in found)
-            self._action_clients[action] = now, there
-        return there
 
     def every(self, seconds: float, callback: Callable[[], None]) -> Callable[[], None]:
         """Call back again and again until the returned function is called."""

@@ -4,11 +4,11 @@ clients watched.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable
 from typing import Any, Protocol
 
 from ir_msgs.msg import LoadCheck
+from ir_msgs_py.ros.goal_clients import Gone
 from ir_msgs_py.ros.plan_conversions import contact_to_msg
 from ir_sim_driver.controller import Driver, refused
 from ir_sim_driver.load_check import LoadFinding
@@ -16,36 +16,6 @@ from ir_sim_driver.motion import ErrorCode, GoalOutcome, TrajectoryGoal
 from ir_sim_driver.node.bounded_goals import Admission
 from ir_sim_driver.node.messages import fill_load_check, fill_points, goal_from_action
 from ir_values.errors import one_line
-
-_DISCOVERY = 10.0  # s in which the client of a goal shows in the graph, on a busy machine too
-
-
-class ClientWatch:
-    """Whether the client of a goal has been gone for `timeout` [s]; 0: never.
-
-    participant: of who sent it. b"" where nobody knows: any client of the action counts then. One
-    that does not show in the graph within `discovery` [s] can't be watched and counts as gone;
-    until then any client counts.
-    """
-
-    def __init__(
-        self, timeout: float, participant: bytes = b"", discovery: float = _DISCOVERY
-    ) -> None:
-        self._timeout = timeout
-        self._participant = participant
-        self._known = False
-        self._seen = time.monotonic()
-        self._until = self._seen + discovery
-
-    def gone(self, clients: Sequence[bytes]) -> bool:
-        """Look at the identities of those who are clients of the action now."""
-        now = time.monotonic()
-        own = any(each.startswith(self._participant) for each in clients)
-        self._known = self._known or (own and bool(self._participant))
-        discovering = bool(clients) and not self._known and now < self._until
-        if own or discovering:
-            self._seen = now
-        return 0.0 < self._timeout < now - self._seen
 
 
 class Executing(Protocol):
@@ -60,9 +30,6 @@ class Executing(Protocol):
     def every(self, seconds: float, callback: Callable[[], None]) -> Callable[[], None]:
         """Call back again and again until the returned function is called."""
 
-    def clients_of(self, action: str) -> Sequence[bytes]:
-        """Identities of the clients of an action in the graph."""
-
     def now_msg(self) -> Any:
         """Time of the plant, as a message."""
 
@@ -71,24 +38,22 @@ FEEDBACK_PERIOD = 0.05  # s: 20 Hz, enough for a person or a progress bar
 
 
 class Executions:
-    """Goals of one kind of action, ExecuteTrajectory or FollowJointTrajectory, called `name`, on
-    `driver`.
+    """Goals of one kind of action, ExecuteTrajectory or FollowJointTrajectory, on `driver`.
 
     client_timeout [s]: how long a movement goes on when its client is gone; 0: to its end.
     """
 
     def __init__(
-        self, driver: Driver, node: Executing, action_type: Any, name: str, client_timeout: float
+        self, driver: Driver, node: Executing, action_type: Any, client_timeout: float
     ) -> None:
         self._driver = driver
         self._node = node
         self._type = action_type
-        self._name = name
         self._client_timeout = client_timeout
         self._tickets: dict[bytes, int] = {}
         self._canceled: set[bytes] = set()
         self.admission_of: Callable[[bytes], Admission] = lambda goal_id: Admission()
-        self.client_of: Callable[[bytes], bytes] = lambda goal_id: b""  # its participant
+        self.watch: Callable[[bytes, float], Gone] = lambda goal_id, timeout: lambda: False
 
     async def execute(self, handle: Any) -> Any:
         """Carry a goal out; the action's result."""
@@ -107,7 +72,7 @@ class Executions:
             return goal
 
         admission = self.admission_of(key)
-        client = self.client_of(key)
+        gone = self.watch(key, self._client_timeout)
         if admission.refusal:
             return self._result(handle, refused(admission.refusal))
         points = len(request.trajectory.points)
@@ -115,11 +80,10 @@ class Executions:
         self._tickets[key] = ticket
         if key in self._canceled:  # before it was submitted
             self._driver.cancel(ticket)
-        watch = ClientWatch(self._client_timeout, client)
 
         def report() -> None:
             self._publish_feedback(handle, ticket)
-            if watch.gone(self._node.clients_of(self._name)):
+            if gone():
                 seconds = self._client_timeout
                 self._driver.abandon(ticket, f"the goal has had no client for {seconds:g} s")
 
