@@ -125,9 +125,17 @@ def test_what_is_taken_back_outside_ext_stays_and_is_said(plc):
     run(plc, 0.05)
     plc.set_operating_mode(OperatingMode.T1)
     plc.set_bit("ab", False)
-    assert plc.remark("ab") == "PLC bit AB is 0 but ignored: operating mode is T1, must be EXT"
+    sentence = "PLC bit AB is 0 but ignored: operating mode is T1, must be EXT"
+    assert plc.remark("ab") == sentence
     run(plc, 0.05)
     assert plc.rest is Mode.BUS_POWER_OFF
+    assert warnings(plc)[-1] == sentence
+    plc.set_bit("drives_on", True)
+    run(plc, 0.05)
+    assert warnings(plc) == []  # said once
+    plc.set_operating_mode(OperatingMode.EXT)
+    run(plc, 0.05)
+    assert plc.rest is None
 
 
 def test_a_bit_that_is_stuck_says_so():

@@ -336,8 +336,9 @@ class Plc:
             self._debounce(dt)
         if self.levels is self._judged[0] and pause_active is self._judged[1]:
             return False
+        before = self._judged[0]
         self._judged = (self.levels, pause_active)
-        self._judge(pause_active)
+        self._judge(pause_active, before)
         return True
 
     def rose(self, bit: str) -> int:
@@ -425,8 +426,11 @@ class Plc:
                     self.confirm |= bit == "conf_mess"
                     self.restart |= bit == RESTART_BIT
 
-    def _judge(self, pause_active: bool) -> None:
-        """Decide what AB, HIB and KS mean together; what is refused leaves `rest` as it was."""
+    def _judge(self, pause_active: bool, before: object) -> None:
+        """Decide what AB, HIB and KS mean together; what is refused leaves `rest` as it was.
+
+        before: the levels that were judged last.
+        """
         on = [bit for bit in POWER_BITS if getattr(self.levels, bit)]
         names = " and ".join(bit.upper() for bit in on)
         refusal = self._refusal(on, pause_active)
@@ -446,6 +450,10 @@ class Plc:
                 self._warn_at = self._uptime + _HANDOVER
             else:
                 self._notices.add(Level.WARN, warning)
+        elif self.rest is not None and self.operating_mode is not OperatingMode.EXT:
+            bit = ROW[self.rest].bit
+            if getattr(before, bit, False):
+                self._notices.add(Level.WARN, f"PLC bit {bit.upper()} is 0 but ignored: {refusal}")
         if (
             self.operating_mode is OperatingMode.EXT
             and self.rest is not None
