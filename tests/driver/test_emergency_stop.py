@@ -238,6 +238,95 @@ def test_recovering_from_nothing_is_harmless(make):
     assert simulation.modes.mode is Mode.STAND_ON_MOTORS
 
 
+def test_a_second_recover_says_that_it_recovered_nothing(stopped):
+    stopped.run(0.5)
+    stopped.plc.set_bit("emergency_stop", False)
+    stopped.run(0.1)
+    assert stopped.recover() == "the brakes open where the robot stands; nothing resumes"
+    assert stopped.recover() == "nothing to recover from: stop 1 is recovered, the brakes open"
+    stopped.run(1.0)
+    assert stopped.modes.mode is Mode.STAND_ON_MOTORS
+    assert stopped.recover() == "nothing to recover from: the mode is STAND_ON_MOTORS"
+
+
+def test_a_recover_in_the_step_of_a_fault_lets_the_brakes_stop_the_robot_first(
+    make, plan, start, home
+):
+    simulation = make("pybullet")
+    start(simulation, plan(2.5, home, home + np.array([1.2, 0.4, -0.4, 0.8, -0.5, 1.0])))
+    simulation.run(1.25)
+    assert np.abs(simulation.backend.qd).max() > 0.5
+    simulation.plc.stop.fault(simulation.plc.order)
+    simulation.recover()
+    assert simulation.modes.mode is Mode.EMERGENCY_STOP
+    simulation.run(2.0)
+    (outcome,) = simulation.take_outcomes()
+    assert outcome.code == ErrorCode.INVALID_GOAL
+    assert simulation.modes.mode is Mode.STAND_ON_MOTORS
+
+
+def test_a_recover_while_the_robot_rolls_on_keeps_the_stop_until_it_stands(stopped):
+    stopped.run(0.002)
+    stopped.plc.set_bit("emergency_stop", False)
+    stopped.run(0.022)
+    assert np.abs(stopped.backend.qd).max() > 0.5
+    stopped.recover()
+    while stopped.modes.mode is Mode.EMERGENCY_STOP:
+        stopped.run(0.001)
+    assert np.abs(stopped.backend.qd).max() < 1e-4  # the motors have taken the arm up
+    assert 1e-5 < stopped.safety.emergency.excursion < 0.05
+
+
+@pytest.mark.parametrize("asked", ["ab", "a pause"])
+@pytest.mark.parametrize("recovered", [False, True])
+def test_a_press_in_bus_power_off_is_latched_while_the_mode_says_what_is_powered(
+    make, home, asked, recovered
+):
+    simulation = make("ideal")
+    simulation.run(1.0)
+    if asked == "ab":
+        simulation.plc.set_bit("ab", True)
+    else:
+        simulation.pauses.start(600.0, executing=False)
+    simulation.run(10.0)
+    assert simulation.modes.mode is Mode.BUS_POWER_OFF
+    simulation.plc.set_bit("emergency_stop", True)
+    simulation.run(1.0)
+    assert simulation.stopped
+    assert not simulation.outputs().alarm_stop
+    assert report_says(simulation, "emergency stop")
+    stays = simulation.modes.mode
+    assert stays is (Mode.BUS_POWER_OFF if asked == "ab" else Mode.FROM_BUS_POWER_OFF)
+    simulation.plc.set_bit("emergency_stop", False)
+    simulation.run(0.1)
+    if recovered:
+        simulation.recover()
+        assert simulation.modes.mode is stays
+    simulation.plc.set_bit("ab", False)
+    simulation.run(25.0)
+    ends = Mode.STAND_ON_MOTORS if recovered else Mode.EMERGENCY_STOP
+    assert simulation.modes.mode is ends
+    assert np.abs(simulation.backend.q - home).max() < 1e-9
+
+
+def report_says(simulation, text):
+    return any(text in entry.sentence for entry in report(simulation, 0.0))
+
+
+def test_a_goal_that_a_stop_ends_before_it_has_stopped_on_its_path_says_so(make, plan, start, home):
+    simulation = make("ideal")
+    goal_id = start(simulation, plan(2.5, home, home + 0.8 * np.eye(6)[0]))
+    simulation.run(1.25)
+    simulation.cancel(goal_id)
+    simulation.run(0.05)
+    assert simulation.executor.path_speed > 0.1
+    simulation.plc.set_bit("emergency_stop", True)
+    simulation.run(0.01)
+    (outcome,) = simulation.take_outcomes()
+    assert (outcome.code, outcome.canceled) == (ErrorCode.INVALID_GOAL, False)
+    assert outcome.sentence == "emergency stop, before the robot stood: canceled"
+
+
 def test_a_goal_that_follows_another_driver_process_is_refused(make, plan, start, home):
     known = make(before_first_stop=1_795_973_304_123_000_000)
     anew = make(before_first_stop=1_795_973_304_124_000_000)

@@ -104,6 +104,10 @@ class EmergencyStop:
         executor.drop(sentence)
         executor.hold(q)
 
+    def close_brakes(self) -> None:
+        """The brakes have closed while no physics were there to show it."""
+        self._open = 0
+
     def step(self) -> None:
         """Make a step of dt: coast, or halt, while the brakes react; brake, then rest."""
         backend = self._backend
@@ -223,6 +227,7 @@ class Safety:
         q = self._backend.q
         if self._broken:
             self._backend.reset(q)
+            self.emergency.close_brakes()
         if not self.emergency.stopping:
             self._executor.hold(q)
         self.fault = ""

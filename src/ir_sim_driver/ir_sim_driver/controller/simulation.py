@@ -341,10 +341,15 @@ class Simulation:
         """Leave the emergency stop: release the brakes where the robot stands, move and resume
         nothing.
 
-        Returns a remark. Raises RequestRefusedError.
+        Returns what was done; a stop between two steps is acted upon first. Raises
+        RequestRefusedError.
         """
-        if self.modes.mode is not Mode.EMERGENCY_STOP and not self.stopped:
+        if not self.stopped:
+            if self.modes.mode is Mode.EMERGENCY_STOP:
+                number = stop_count(self.stop_number)
+                return f"nothing to recover from: stop {number} is recovered, the brakes open"
             return f"nothing to recover from: the mode is {self.modes.mode.name}"
+        self.heed_stop()
         self.safety.recover()
         self.cell_watch.recovered()
         if self.modes.mode is not Mode.EMERGENCY_STOP:
@@ -438,7 +443,8 @@ class Simulation:
         self.safety.supervise(motors_on, self.settings.execution.tube)
 
     def _still(self) -> bool:
-        return self.executor.path_speed == 0.0 and self.backend.standing
+        still = self.executor.path_speed == 0.0 and self.backend.standing
+        return still and not self.safety.emergency.stopping
 
     def _mode_changed(self, before: Mode, now: Mode) -> None:
         if now is Mode.EMERGENCY_STOP:

@@ -27,6 +27,9 @@ from ir_sim_driver.motion.trajectory_checks import CurrentPath, LeadPath
 from ir_sim_driver.plant import Backend
 from ir_values.arrays import FloatArray
 
+ON_THE_PATH = "; stopped on the path"
+"""End of the sentences of goals that a stop along the path ends."""
+
 # Commands of the steps ahead: while path time passes evenly, many cost what one does.
 
 _STEPS = 64
@@ -328,11 +331,19 @@ class Executor:
             self._run.stopping = True
 
     def drop(self, sentence: str, code: ErrorCode = ErrorCode.INVALID_GOAL) -> None:
-        """End the goal at once: nobody follows the command any more."""
-        if self._run is not None:
-            if not self._run.stopping or code is not ErrorCode.INVALID_GOAL:
-                self._will_end(code, sentence, canceled=False)
-            self._finish()
+        """End the goal at once: nobody follows the command any more. One that was stopping has not
+        stopped on its path, whatever it was stopped for.
+        """
+        run = self._run
+        if run is None:
+            return
+        if run.stopping and code is ErrorCode.INVALID_GOAL:
+            before = run.outcome
+            code = code if before.code is ErrorCode.SUCCESSFUL else before.code
+            reason = before.sentence.removesuffix(ON_THE_PATH)
+            sentence = f"{sentence}, before the robot stood: {reason}"
+        self._will_end(code, sentence, canceled=False)
+        self._finish()
 
     def hold(self, q: FloatArray) -> None:
         """Command to stay at q (n,). Only while no goal is executed."""
@@ -415,7 +426,7 @@ class Executor:
         sentence = run.path_tolerance.broken_position(self._names, error)
         if not sentence and run.path_tolerance.has_velocity:
             sentence = run.path_tolerance.broken_velocity(self._names, self.motion().qd - robot.qd)
-        return f"{sentence} at {self.path_time:.3f} s; stopped on the path" if sentence else ""
+        return f"{sentence} at {self.path_time:.3f} s{ON_THE_PATH}" if sentence else ""
 
     def _settle(self, run: _Run, error: FloatArray, robot: Backend) -> None:
         sentence = run.goal_tolerance.broken_position(self._names, error)
