@@ -86,3 +86,46 @@ def test_joints_are_read_by_name_in_whichever_order(tmp_path: Path) -> None:
     for name, values in plain.columns.items():
         assert trace.columns[name].tolist() == values.tolist()
     assert trace.problems == ("1 joint states of finger: left out",)
+
+
+def with_topic(path: Path, name: str, kind: str, messages: list[bytes], *, first: bool) -> Path:
+    """The bag with one more topic, before or behind the others."""
+    with sqlite3.connect(path) as file:
+        number = 0 if first else 2
+        file.execute("INSERT INTO topics VALUES (?, ?, ?)", (number, name, kind))
+        rows = [(number, 10**9 + k, each) for k, each in enumerate(messages)]
+        file.executemany("INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)", rows)
+    return path
+
+
+def test_states_are_read_and_not_commands_however_many(tmp_path: Path) -> None:
+    commands = states(40)
+    for each in commands:
+        each.position = [9.0, 9.0]
+    path = bag(tmp_path / "run.db3", states(20))
+    raw = [serialize_message(each) for each in commands]
+    with_topic(path, "/joint_commands", "sensor_msgs/msg/JointState", raw, first=True)
+    (trace,) = read_traces(path, None, NAMES)
+    assert trace.columns["joint_a2"] == pytest.approx(-0.2 * np.arange(20))
+    assert "/joint_commands" in trace.problems[0]
+
+
+def test_a_topic_of_power_is_named_as_not_read(tmp_path: Path) -> None:
+    path = bag(tmp_path / "run.db3", states(20))
+    with_topic(path, "/power", "std_msgs/msg/Float64", [b"\0\1\0\0" + bytes(8)] * 5, first=False)
+    (trace,) = read_traces(path, None, NAMES)
+    assert trace.problems == (
+        "read is /joint_states; topics that are not: /power (std_msgs/msg/Float64)",
+    )
+
+
+def test_a_clock_that_moved_back_is_refused_and_late_messages_are_not(tmp_path: Path) -> None:
+    moved = states(20)
+    for each in moved[12:]:
+        each.header.stamp.sec = 4
+    with pytest.raises(RecorderError, match=r"stamp of joint state 13 is 0\.99 s before"):
+        read_traces(bag(tmp_path / "moved.db3", moved), None, NAMES)
+    late = states(20)
+    late[5], late[6] = late[6], late[5]
+    (trace,) = read_traces(bag(tmp_path / "late.db3", late), None, NAMES)
+    assert trace.problems == ("1 joint states go back in time: left out",)

@@ -55,6 +55,9 @@ def check(trace: Trace, step: float) -> None:
         ("time", "A{}", 1, 180 / np.pi, 1.0),
         ("time", "A{} [rad]", 1, 1.0, 1.0),
         ("time", "a{} (deg)", 1, 180 / np.pi, 1.0),
+        ("time", "A{} [\N{DEGREE SIGN}]", 1, 180 / np.pi, 1.0),
+        ("timestamp_ms", "actual_q_{} [degrees]", 0, 180 / np.pi, 1e3),
+        ("timestamp", "actual_q_{}_deg", 0, 180 / np.pi, 1.0),
         ("time_ms", "J{}", 1, 180 / np.pi, 1e3),
         ("header.tm", "feedBack.joints.joints.{}", 0, 180 / np.pi, 1e3),
     ],
@@ -210,6 +213,39 @@ def test_power_of_a_ur_is_its_voltage_times_its_current(tmp_path: Path) -> None:
     trace = read(tmp_path / "log.csv")
     check(trace, 0.008)
     assert trace.columns["power"] == pytest.approx(volts * amperes)
+
+
+UR = ["timestamp", *(f"actual_q_{k}" for k in range(6))]
+POWER = ["actual_robot_voltage", "actual_robot_current [mA]"]
+
+
+def ur_rows(*more: float) -> np.ndarray:
+    """Positions as RTDE gives them, and further columns of constants."""
+    rows = timed(0.008, np.radians(degrees()))
+    return np.column_stack([rows, np.tile(more, (COUNT, 1))])
+
+
+def test_units_of_headings_count_in_a_product(tmp_path: Path) -> None:
+    path = table(tmp_path / "log.csv", [*UR, *POWER], ur_rows(48.0, 2000.0))
+    assert read(path).columns["power"] == pytest.approx(96.0)
+
+
+def test_a_meters_own_column_comes_before_the_power_of_the_bus(tmp_path: Path) -> None:
+    path = table(tmp_path / "log.csv", [*UR, *POWER, "power_kW"], ur_rows(48.0, 2000.0, 0.12))
+    assert read(path).columns["power"] == pytest.approx(120.0)
+
+
+def test_a_unit_that_nobody_knows_is_refused(tmp_path: Path) -> None:
+    headings = ["timestamp", *(f"actual_q_{k} [gon]" for k in range(6))]
+    path = table(tmp_path / "log.csv", headings, ur_rows())
+    with pytest.raises(RecorderError, match="unit 'gon' is unknown"):
+        read(path)
+
+
+def test_a_joint_that_is_missing_is_named(tmp_path: Path) -> None:
+    path = table(tmp_path / "log.csv", UR[:-1], ur_rows()[:, :-1])
+    with pytest.raises(RecorderError, match=r"actual_q_0 and no actual_q_5: the robot has 6"):
+        read(path)
 
 
 def test_files_of_one_axis_each_are_joined(tmp_path: Path) -> None:

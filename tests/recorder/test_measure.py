@@ -19,7 +19,8 @@ from ir_kernels import DynamicsModel, dc_bus
 from ir_kernels.power import DcBusParameters
 from ir_recorder.measure.arm import arm_torques
 from ir_recorder.measure.power_model import BusFlow, bus_flow
-from ir_recorder.measure.samples import BANDWIDTH, differentiated, half_width
+from ir_recorder.measure.samples import BANDWIDTH, differentiated, half_width, samples_of
+from ir_recorder.traces import Trace
 
 RECORDER = Path(ir_recorder.__file__).parent
 
@@ -130,3 +131,26 @@ def test_polynomials_are_differentiated_exactly_and_the_bandwidth_is_as_stated()
     passed = differentiated(wave, 0.002)[0][inner]
     assert np.std(passed) / np.std(wave) == pytest.approx(np.sqrt(0.5), abs=0.05)  # 3 dB
     assert half_width(100.0) >= 3
+
+
+MODES = ("STAND_ON_MOTORS", "HIBERNATION")
+
+
+@pytest.mark.parametrize(("mode", "known"), [("STAND_ON_MOTORS", False), ("HIBERNATION", True)])
+def test_a_gap_is_a_rest_only_where_the_drives_are_off(mode: str, known: bool) -> None:
+    """With drives on the robot may have moved out and back in it."""
+    time = np.concatenate([0.01 * np.arange(100), 3.0 + 0.01 * np.arange(100)])
+    inside = (time > 0.5) & (time < 3.5)
+    words = tuple(mode if each else MODES[0] for each in inside)
+    joints = Trace("log", time, {"a": np.full(200, 0.3)}, {"mode": words})
+    samples = samples_of(joints, None, ("a",), MODES, [(-np.inf, np.inf, ())])
+    middle = (samples.time > 1.1) & (samples.time < 2.9)
+    assert (samples.known[middle] == known).all()
+
+
+@pytest.mark.parametrize("count", range(4, 14))
+def test_a_log_shorter_than_the_filter_is_sampled(count: int) -> None:
+    time = 0.008 * np.arange(count)
+    joints = Trace("log", time, {"a": 0.1 * time})
+    samples = samples_of(joints, None, ("a",), MODES, [(-np.inf, np.inf, ())])
+    assert samples.q[:, 0] == pytest.approx(0.1 * samples.time, abs=1e-3)

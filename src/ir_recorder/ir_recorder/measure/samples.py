@@ -222,6 +222,10 @@ def samples_of(
     mode, motors = _modes(
         meter if meter is not None and MODE in meter.texts else joints, modes, middles
     )
+    for start, length in joints.gaps():  # what stands without drives is not recorded everywhere
+        inside = (middles > start) & (middles < start + length) & motors
+        for each in (q, qd, qdd):
+            each[inside] = np.nan
     held, load = _loads(loads, middles)
     energy = None if meter is None else meter.joules()
     watts = np.full(count, np.nan)
@@ -336,7 +340,8 @@ def _at_rest(held: FloatArray, lost: BoolArray) -> BoolArray:
 
 def _wide(rows: BoolArray, width: int) -> BoolArray:
     """These rows and `width` neighbours on each side."""
-    return np.asarray(np.convolve(rows, np.ones(2 * width + 1), mode="same") > 0.5)
+    sums = np.convolve(rows, np.ones(2 * width + 1))
+    return np.asarray(sums[width : width + len(rows)] > 0.5)
 
 
 def _modes(trace: Trace, modes: Sequence[str], middles: FloatArray) -> tuple[IntArray, BoolArray]:

@@ -30,9 +30,13 @@ FACTORS: dict[str, float] = {
     "rad": 1.0,
     "mrad": 1e-3,
     "deg": math.radians(1.0),
+    "\N{DEGREE SIGN}": math.radians(1.0),
+    "degree": math.radians(1.0),
+    "degrees": math.radians(1.0),
     "rad/s": 1.0,
     "mrad/s": 1e-3,
     "deg/s": math.radians(1.0),
+    "\N{DEGREE SIGN}/s": math.radians(1.0),
     "rad/s^2": 1.0,
     "deg/s^2": math.radians(1.0),
     "nm": 1.0,
@@ -43,7 +47,9 @@ FACTORS: dict[str, float] = {
     "wh": 3600.0,
     "kwh": 3.6e6,
     "v": 1.0,
+    "mv": 1e-3,
     "a": 1.0,
+    "ma": 1e-3,
 }
 """SI value of one of each unit, by its lower-case name."""
 
@@ -71,6 +77,20 @@ def parsed(heading: str, where: str) -> tuple[str, float]:
     if found and found["unit"].lower() in FACTORS and found["unit"].lower() not in ("v", "a"):
         return found["name"], FACTORS[found["unit"].lower()]
     return heading, 1.0
+
+
+def split_unit(heading: str) -> tuple[str, str]:
+    """Name and unit of a heading, in brackets or behind the last "_" where it is a known one; ""
+    where there is none.
+    """
+    heading = heading.strip()
+    found = _BRACKETS.match(heading)
+    if found:
+        return found["name"].strip(), found["unit"].strip()
+    found = _ENDING.match(heading)
+    if found and len(found["unit"]) > 1 and found["unit"].lower() in FACTORS:
+        return found["name"], found["unit"]
+    return heading, ""
 
 
 # A small file that says what the columns of a trace are, where their headings do not.
@@ -190,13 +210,6 @@ def _column(where: str, tree: Any) -> Column:
 def _is_number(tree: Any) -> bool:
     """Whether a column is given by its number."""
     return isinstance(tree, int) and not isinstance(tree, bool)
-
-
-def unit_of(heading: str) -> str:
-    """The unit in a heading's brackets, "" where there is none that is known."""
-    found = _BRACKETS.match(heading.strip())
-    unit = found["unit"].strip() if found else ""
-    return unit if unit.lower() in FACTORS else ""
 
 
 def _in_heading(heading: str) -> float:

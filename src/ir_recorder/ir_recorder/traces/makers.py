@@ -9,7 +9,6 @@ would turn farther than an arm can if they were rad. Whatever is taken is said.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -17,7 +16,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ir_recorder.errors import RecorderError
-from ir_recorder.traces.columns import FACTORS, Column, TraceMapping, unit_of
+from ir_recorder.traces.columns import Column, TraceMapping, factor, split_unit
 from ir_recorder.traces.trace import CURRENT, POWER, TIME, VELOCITY
 from ir_values.arrays import FloatArray
 
@@ -124,9 +123,11 @@ def makers_columns(
     RecorderError for a joint that the robot doesn't have, and for a time without a unit.
     """
     places = _by_name(headings)
+    nearly = ""
     for family in _FAMILIES:
         found = [places.get(family.name.format(family.first + k)) for k in range(len(joint_names))]
         if not joint_names or None in found:
+            nearly = nearly or _missing(family, found)
             continue
         own = [heading for heading in found if heading is not None]
         extra = places.get(family.name.format(family.first + len(joint_names)))
@@ -134,7 +135,18 @@ def makers_columns(
             there = ", ".join(joint_names)
             raise RecorderError(f"{where}: {extra} is no joint of the robot, which has {there}")
         return _columns(family, own, joint_names, places, where, time)
+    if nearly:
+        raise RecorderError(f"{where}: {nearly}")
     return None
+
+
+def _missing(family: _Family, found: Sequence[str | None]) -> str:
+    """What a maker's format lacks where it has most joints of the robot."""
+    there = [heading for heading in found if heading is not None]
+    if not family.of or 2 * len(there) <= len(found):
+        return ""
+    missing = family.name.format(family.first + found.index(None))
+    return f"there is {there[0]} and no {missing}: the robot has {len(found)} joints"
 
 
 def _columns(
@@ -145,16 +157,16 @@ def _columns(
     where: str,
     time: Column | None,
 ) -> MakersColumns:
-    units = [unit_of(heading) or family.unit for heading in own]
+    units = [split_unit(heading)[1] or family.unit for heading in own]
     unproved = "" in units
     if unproved and any(units):
         raise RecorderError(f"{where}: only some of {own[0]} .. {own[-1]} have a unit")
     columns = {TIME: time or _time(family, places, where)}
     for name, heading, unit in zip(joint_names, own, units, strict=True):
-        columns[name] = Column(heading, FACTORS[unit.lower()] if unit else 1.0)
-    columns.update(_further(family, joint_names, places))
+        columns[name] = Column(heading, factor(unit, f"{where}: {heading}") if unit else 1.0)
+    columns.update(_further(family, joint_names, places, where))
     said = f"{own[0]} .. {own[-1]} are taken as positions of {joint_names[0]} .. {joint_names[-1]}"
-    if family.of and not unit_of(own[0]):
+    if family.of and not split_unit(own[0])[1]:
         said += f", in {family.unit} as {family.of} gives them"
     return MakersColumns(
         TraceMapping(MappingProxyType(columns)),
@@ -165,24 +177,30 @@ def _columns(
 
 
 def _further(
-    family: _Family, joint_names: Sequence[str], places: Mapping[str, str]
+    family: _Family, joint_names: Sequence[str], places: Mapping[str, str], where: str
 ) -> Iterator[tuple[str, Column]]:
     """Speeds and currents that the format has of all joints, and its power."""
-    if family.power and set(family.power) <= set(places) and POWER not in places:
-        volts, *others = (Column(places[name]) for name in family.power)
+    if family.power and set(family.power) <= set(places):
+        volts, *others = (_with_unit(places[name], where) for name in family.power)
         yield POWER, replace(volts, others=tuple(others))
     for pattern, ending, unit in family.more:
         found = [places.get(pattern.format(family.first + k)) for k in range(len(joint_names))]
         own = [heading for heading in found if heading is not None]
         if len(own) == len(joint_names):
             for name, heading in zip(joint_names, own, strict=True):
-                yield f"{name}{ending}", Column(heading, FACTORS[unit_of(heading) or unit])
+                yield f"{name}{ending}", _with_unit(heading, where, unit)
+
+
+def _with_unit(heading: str, where: str, usual: str = "") -> Column:
+    """A column in the unit of its heading; else in the usual one, "" in SI."""
+    unit = split_unit(heading)[1] or usual
+    return Column(heading, factor(unit, f"{where}: {heading}") if unit else 1.0)
 
 
 def _time(family: _Family, places: Mapping[str, str], where: str) -> Column:
     heading, unit = family.time
     if heading in places:
-        return Column(places[heading], FACTORS[(unit_of(places[heading]) or unit).lower()])
+        return _with_unit(places[heading], where, unit)
     found = next((places[name] for name in _TIMES if name in places), None)
     if found is None:
         known = ", ".join(places.values())[:200]
@@ -190,13 +208,12 @@ def _time(family: _Family, places: Mapping[str, str], where: str) -> Column:
             f"{where}: there is no column time, there is: {known}; a mapping (--mapping) gives the "
             "step between rows: time: {step: 4, unit: ms}"
         )
-    unit = unit_of(found)
-    if not unit:
+    if not split_unit(found)[1]:
         raise RecorderError(
             f"{where}: column {found} has no unit: write it into the heading, as {found} [s], or "
             "into a mapping (--mapping)"
         )
-    return Column(found, FACTORS[unit.lower()])
+    return _with_unit(found, where)
 
 
 def _by_name(headings: Sequence[str]) -> dict[str, str]:
@@ -204,7 +221,7 @@ def _by_name(headings: Sequence[str]) -> dict[str, str]:
     found: dict[str, str] = {}
     twice = set()
     for heading in headings:
-        name = re.sub(r"\s*[\[(].*", "", heading).strip().lower()
+        name = split_unit(heading)[0].lower()
         if name in found:
             twice.add(name)
         found[name] = heading

@@ -57,6 +57,7 @@ int32 sec
 uint32 nanosec
 """
 _MOST = 5_000_000  # messages
+_JOINT_STATES = "joint_states"  # what ROS calls the topic; commands have other names
 _FIELDS = (("position", ""), ("velocity", VELOCITY), ("effort", EFFORT))
 
 
@@ -65,7 +66,7 @@ def read_bag(path: Path) -> Trace:
     os.close(opened(path))  # of a bounded size, and a regular file
     try:
         with sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True) as bag:
-            rows = _messages(bag, path)
+            rows, problems = _messages(bag, path)
     except sqlite3.Error as error:
         raise RecorderError(f"{path}: can't be read as a bag: {error}") from error
     fit = fitting([data for _, data in rows], JOINT_STATE, _SCHEMA)
@@ -79,7 +80,7 @@ def read_bag(path: Path) -> Trace:
         robot = one_robot(groups)
     except ReadError as error:
         raise RecorderError(f"{path}: {error}") from error
-    problems = [
+    problems += [
         f"{len(groups[each])} joint states of {', '.join(each)[:200] or 'no joint'}: left out"
         for each in groups
         if each not in robot
@@ -92,6 +93,7 @@ def read_bag(path: Path) -> Trace:
     nanoseconds = np.array([time for time, _ in rows]) if not stamps.any() else stamps
     time = (nanoseconds - nanoseconds[0]) * 1e-9
     kept = np.concatenate([[True], time[1:] > np.maximum.accumulate(time)[:-1]])
+    _check_clock(path, time, kept)
     found = {}
     names = robot[0]
     fields = by_name(columns, names, *(field for field, _ in _FIELDS))
@@ -114,20 +116,43 @@ def types_of(path: Path) -> frozenset[str]:
         raise RecorderError(f"{path}: can't be read as a bag: {error}") from error
 
 
-def _messages(bag: sqlite3.Connection, path: Path) -> list[tuple[int, bytes]]:
-    """Times [ns] and bytes of the topic that has most joint states."""
+_BACK = 10.0  # usual steps: messages that came late, more is another clock
+
+
+def _check_clock(path: Path, time: FloatArray, kept: FloatArray) -> None:
+    """RecorderError where stamps (N,) go back by more than late messages do."""
+    usual = float(np.median(np.diff(time[kept]))) if np.count_nonzero(kept) > 1 else 0.0
+    back = np.maximum.accumulate(time) - time
+    worst = int(back.argmax())
+    if back[worst] > _BACK * usual and back[worst] > 0.0:
+        raise RecorderError(
+            f"{path}: the stamp of joint state {worst + 1} is {back[worst]:.3g} s before one that "
+            f"came earlier, at most {_BACK * usual:.3g} s ({_BACK:g} usual steps) are put down to "
+            "late messages: did a clock move?"
+        )
+
+
+def _messages(bag: sqlite3.Connection, path: Path) -> tuple[list[tuple[int, bytes]], list[str]]:
+    """Times [ns] and bytes of the joint states that are read: of the topic of that name, else of
+    the one with most; and a sentence on what else is in the bag.
+    """
     topics = bag.execute(
-        "SELECT t.id, COUNT(m.id) FROM topics t JOIN messages m ON m.topic_id = t.id "
-        "WHERE t.type = ? GROUP BY t.id ORDER BY COUNT(m.id) DESC, t.id",
-        (JOINT_STATE,),
+        "SELECT t.id, t.name, t.type, COUNT(m.id) FROM topics t JOIN messages m "
+        "ON m.topic_id = t.id GROUP BY t.id ORDER BY COUNT(m.id) DESC, t.id"
     ).fetchall()
-    if not topics:
+    states = [each for each in topics if each[2] == JOINT_STATE]
+    if not states:
         raise RecorderError(f"{path}: there are no messages of {JOINT_STATE} in it")
-    topic, count = topics[0]
+    named = [each for each in states if str(each[1]).rpartition("/")[2] == _JOINT_STATES]
+    topic, name, _, count = (named or states)[0]
     if count > _MOST:
         raise RecorderError(f"{path}: has {count} joint states, at most {_MOST} are read")
+    others = [f"{own} ({kind})"[:100] for each, own, kind, _ in topics if each != topic]
+    problems = []
+    if others:
+        problems.append(f"read is {str(name)[:100]}; topics that are not: {listed(others, 8)}")
     query = "SELECT timestamp, data FROM messages WHERE topic_id = ? ORDER BY timestamp, id"
-    return [(int(time), bytes(data)) for time, data in bag.execute(query, (topic,))]
+    return [(int(time), bytes(data)) for time, data in bag.execute(query, (topic,))], problems
 
 
 # Traces of a recording: the joints' and the meter's, each with its own instants.

@@ -307,7 +307,7 @@ def _maker_of(
         for heading, (name, scale) in plain.items()
         if name != TIME and wanted(name)
     }
-    columns = MappingProxyType({**beside, **found.mapping.columns})
+    columns = MappingProxyType({**found.mapping.columns, **beside})
     return replace(found, mapping=replace(mapping, columns=columns))
 
 
