@@ -6,6 +6,7 @@ import socket
 
 import numpy as np
 import pytest
+from action_msgs.msg import GoalStatus
 from diagnostic_msgs.msg import DiagnosticArray
 from pymodbus.client import ModbusTcpClient
 from rclpy.action import ActionClient
@@ -385,3 +386,20 @@ def test_a_movement_whose_client_has_gone_is_stopped_on_its_path(
         return any("no client" in status.message for msg in diagnostics for status in msg.status)
 
     wait_for(said)
+
+
+def test_the_result_of_a_goal_that_is_not_known_is_no_success(
+    make_driver, ros_node, ros_executor, wait_for
+):
+    """As when somebody asks for it so late that it is not kept any more."""
+    make_driver()
+    kind = ExecuteTrajectory.Impl.GetResultService
+    client = ros_executor.run(
+        lambda: ros_node.create_client(kind, f"{names.EXECUTE_TRAJECTORY}/_action/get_result")
+    )
+    wait_for(client.service_is_ready)
+    answer = ros_executor.run(lambda: client.call_async(kind.Request()))
+    wait_for(answer.done)
+    assert answer.result().status == GoalStatus.STATUS_UNKNOWN
+    assert answer.result().result.error_code == ExecuteTrajectory.Result.INVALID_GOAL
+    assert "no such goal" in answer.result().result.error_string

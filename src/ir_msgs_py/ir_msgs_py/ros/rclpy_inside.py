@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
+from action_msgs.msg import GoalStatus
 from rclpy.action import ActionServer
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.logging import get_logger
@@ -483,8 +484,8 @@ class PatientActionServer(ActionServer):
     """An ActionServer whose responses reach clients that are discovered late, that survives those
     that have gone, and whose requests for goals a subclass may see first.
 
-    Where rclpy's insides are missing, `goal_class` and `goal_came` are not called, and
-    `take_waiting` takes nothing.
+    Where rclpy's insides are missing, `goal_class`, `goal_came` and `unknown_result` are not
+    called, and `take_waiting` takes nothing.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
@@ -499,6 +500,21 @@ class PatientActionServer(ActionServer):
 
     def goal_came(self, request_id: Any, request: Any) -> None:
         """Look at a request for a goal before it is accepted."""
+
+    def unknown_result(self, result: Any) -> None:
+        """Say in an empty result that there is no such goal, or not any more."""
+
+    async def _execute_get_result_request(self, taken: tuple[Any, Any]) -> None:
+        """As rclpy's, which answers for a goal that it does not know with a result of zeros."""
+        header, request = taken
+        goals = part(self, "_goal_handles")
+        if goals is None or bytes(request.goal_id.uuid) in goals:
+            await super()._execute_get_result_request(taken)
+            return
+        response = self.action_type.Impl.GetResultService.Response()
+        response.status = GoalStatus.STATUS_UNKNOWN
+        self.unknown_result(response.result)
+        self._handle.send_result_response(header, response)
 
     def take_waiting(self, most: int) -> bool:
         """Let `goal_came` see the goals that wait for the executor now, from any thread; the

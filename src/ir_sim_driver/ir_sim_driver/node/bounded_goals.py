@@ -27,6 +27,7 @@ from ir_msgs_py.ros.rclpy_inside import (
     part,
 )
 from ir_msgs_py.ros.serving import RecordedActionServer
+from ir_sim_driver.motion import ErrorCode
 
 _NAMES_MAX = 100  # joints, tolerances and states of a goal: a robot has ten
 _AT_ONCE = 50  # points that are converted without a pause for other threads, half a millisecond
@@ -196,6 +197,11 @@ class BoundedActionServer(RecordedActionServer):
     def admission_of(self, goal_id: bytes) -> Admission:
         """Ticket or refusal of a goal. Asked once."""
         return self._admissions.pop(goal_id, Admission())
+
+    def unknown_result(self, result: Any) -> None:
+        """A code of 0 would be SUCCESSFUL."""
+        result.error_code = int(ErrorCode.INVALID_GOAL)
+        result.error_string = "there is no such goal, or its result is not kept any more"
 
     def goal_class(self) -> Any:
         """The counting class."""
