@@ -210,6 +210,19 @@ def test_a_replacement_never_jumps(make, plan, start, cell, at, lead):
     assert second.code == ErrorCode.SUCCESSFUL
 
 
+def test_a_canceled_goal_that_is_replaced_before_it_stands_says_so(make, plan, start, home, there):
+    simulation = make()
+    goal_id = start(simulation, plan(2.0, home, there))
+    simulation.run(1.0)
+    simulation.cancel(goal_id)
+    simulation.run(0.05)
+    assert simulation.executor.path_speed > 0.1
+    start(simulation, plan([2.0, 3.0], home, home))
+    (outcome,) = simulation.take_outcomes()
+    assert outcome.canceled
+    assert outcome.sentence == "canceled; another trajectory took over before the robot stood"
+
+
 def test_a_hundred_replacements_a_second_end_each_goal_once(make, plan, start, home):
     simulation = make()
     ids = []

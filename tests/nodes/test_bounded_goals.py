@@ -15,7 +15,9 @@ from trajectory_msgs.msg import JointTrajectoryPoint, MultiDOFJointTrajectoryPoi
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import JointTolerance
 from ir_msgs_py.ros.topics import ACTION_SERVICES
+from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.node import SimDriver, bounded_goals, node
+from ir_sim_driver.node.messages import goal_from_action
 
 MOST = 10
 
@@ -129,3 +131,15 @@ def test_the_driver_refuses_it_with_the_count_and_forgets_it_soon(
     assert answer.error_code == ExecuteTrajectory.Result.INVALID_GOAL
     assert f"the trajectory has 3000 points: at most {MOST}" in answer.error_string
     wait_for(lambda: not server._goal_handles, what="goal and result are forgotten")
+
+
+def test_a_goal_knows_one_last_stop() -> None:
+    """A step of a program may name one, and the runner names the one that it knows."""
+    sent = goal(2)
+    sent.trajectory.points[1].time_from_start.sec = 1
+    sent.states = ["driver.stops=5", "lathe=door_open", "driver.stops=5"]
+    read = goal_from_action(sent, MOST)
+    assert (read.after_stop, read.states) == (5, ("lathe=door_open",))
+    sent.states = ["driver.stops=5", "driver.stops=7"]
+    with pytest.raises(TrajectoryRefusedError, match=r"driver\.stops is 5 and 7: a goal knows one"):
+        goal_from_action(sent, MOST)

@@ -125,6 +125,16 @@ def upright(tolerances: Any, rotation: Any = None, **fields: Any) -> Any:
 angles = st.lists(st.floats(-1.5, 1.5), min_size=6, max_size=6).map(np.array)
 
 
+@pytest.mark.parametrize(
+    "field",
+    ["allowed_planning_time", "max_velocity_scaling_factor", "max_acceleration_scaling_factor"],
+)
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_options_that_are_no_numbers_are_refused_by_name(field: str, value: float) -> None:
+    with pytest.raises(RequestError, match=f"{field}: it is {value:g}, it must be finite"):
+        asked(plan_request(**{field: value}))
+
+
 def test_joint_goals_options_and_an_empty_start_are_taken() -> None:
     one = asked(plan_request(joints(HOME[::-1], NAMES[::-1])))
     assert list(one.goal_state.name) == list(NAMES)

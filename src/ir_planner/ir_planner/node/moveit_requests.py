@@ -6,6 +6,7 @@ along the way, attached objects. Messages are read by their fields: none of Move
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -245,6 +246,8 @@ def options_of_request(given: Any, safety_distance: float) -> PlanOptions:
         ("allowed_planning_time", "planning_time"),
     ):
         value = float(getattr(given, field, 0.0))
+        if not math.isfinite(value):
+            raise refusal(field, f"it is {value:g}, it must be finite")
         if value != 0.0:
             setattr(options, name, value)
     return options

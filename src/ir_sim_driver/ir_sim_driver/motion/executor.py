@@ -293,10 +293,15 @@ class Executor:
         moving = self.motion().qd.any()
         speed = self.path_speed
         if self._run is not None:
+            outcome = self._run.outcome
             if not self._run.stopping:
                 self._will_end(
                     ErrorCode.INVALID_GOAL, "preempted by another trajectory", canceled=False
                 )
+            elif moving:
+                reason = outcome.sentence.removesuffix(ON_THE_PATH)
+                sentence = f"{reason}; another trajectory took over before the robot stood"
+                self._will_end(outcome.code, sentence, outcome.canceled)
             self._finish()
         s = self._settings
         path_tolerance = GoalTolerances.of(self._names, goal.path_tolerance, s.path_tolerance)

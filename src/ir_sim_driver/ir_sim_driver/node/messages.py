@@ -81,13 +81,18 @@ def _states(goal: Any) -> tuple[tuple[str, ...], int | None]:
         name, _, value = state.partition("=")
         if name != STOPS_STATE:
             machines.append(state)
-        elif value.isascii() and value.isdigit() and len(value) < _DIGITS:
-            after_stop = int(value)
-        else:
+            continue
+        if not (value.isascii() and value.isdigit() and len(value) < _DIGITS):
             raise TrajectoryRefusedError(
                 ErrorCode.INVALID_GOAL,
                 f"{STOPS_STATE} is {value[:24]!a}: it must be below 1e{_DIGITS - 1}",
             )
+        if after_stop not in (None, int(value)):
+            raise TrajectoryRefusedError(
+                ErrorCode.INVALID_GOAL,
+                f"{STOPS_STATE} is {after_stop} and {int(value)}: a goal knows one last stop",
+            )
+        after_stop = int(value)
     return tuple(machines), after_stop
 
 
