@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -33,6 +34,7 @@ from ir_recorder.analysis.indirect import Agreement, MeasuredEnergies, agreement
 from ir_recorder.fit import (
     BY,
     DataSource,
+    Fit,
     doubts,
     fit_data,
     fit_sources,
@@ -318,6 +320,7 @@ def run_fit(arguments: argparse.Namespace) -> int:
             {
                 "parameters": rows,
                 "movements": listed,
+                "gains": _gains(data.model.layout.joints, found),
                 "left_out": left_out_rows(unseen, begun.removeprefix("the ")),
                 "sentences": said,
                 "files": [str(path) for path in written],
@@ -330,6 +333,18 @@ def run_fit(arguments: argparse.Namespace) -> int:
     sys.stdout.write("".join(f"{sentence}\n" for sentence in said))
     sys.stdout.write("".join(f"{path}\n" for path in written))
     return 0
+
+
+def _gains(joints: Sequence[str], found: Fit) -> list[dict[str, object]]:
+    """Amperes per Nm of each motor with their deviations; none where none were recorded."""
+    if not found.currents:
+        return []
+    return [
+        {"joint": joint, "amperes_per_nm": scale, "deviation": deviation}
+        for joint, scale, deviation in zip(
+            joints, found.scales, found.scale_deviations, strict=True
+        )
+    ]
 
 
 def run_excite(arguments: argparse.Namespace) -> int:

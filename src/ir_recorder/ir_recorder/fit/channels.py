@@ -289,6 +289,33 @@ class Motors:
         power = np.maximum((torque**2).sum(axis=0), 1e-12)
         return np.asarray((torque * table).sum(axis=0) / power)
 
+    def doubts_of_scales(
+        self, mean: FloatArray, link_mass: float, rotor_inertia: float
+    ) -> FloatArray:
+        """Variance (n,) of each scale, as a share, that doubts of single links and rotors leave, by
+        the deviations of their factors; 0 for torques.
+
+        The parameters are common factors of all links and of all rotors. Nothing parts the gain of
+        one axis from a rotor or link of its own that is off: what of its torque hangs on these,
+        beside friction and a constant, is so uncertain.
+        """
+        if not self.currents:
+            return np.zeros(self.n)
+        found = np.zeros(self.n)
+        for j in range(self.n):
+            by_column = self._columns[:, j] * self._weights(mean)
+            bodies = by_column.sum(axis=1)
+            side = self._side[:, j]
+            beside = [self.speed[:, j], side, np.abs(bodies) * side, np.ones(len(side))]
+            others = np.column_stack(beside)
+            others /= np.maximum(np.sqrt((others**2).mean(axis=0)), 1e-12)
+            wanted = np.column_stack([bodies, by_column[:, 0], by_column[:, 2]])
+            left = wanted - others @ np.linalg.lstsq(others, wanted, rcond=1e-6)[0]
+            power = max(float(left[:, 0] @ left[:, 0]), 1e-12)
+            by_links, by_rotor = (left[:, 1:].T @ left[:, 0] / power).tolist()
+            found[j] = (link_mass * by_links) ** 2 + (rotor_inertia * by_rotor) ** 2
+        return found
+
     def own_prior(self, mean: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Values and deviations (2 n,) of offsets and scales before the fit."""
         scales = self.scales(mean)

@@ -213,9 +213,9 @@ class Fit:
     meter), torque_noise (n,) of each axis in motion, in what the controller says (none
     without).
     inflation: of the noise, so that the covariance explains the residuals of movements and rests.
-    friction_scale: times the deviation of friction before. offsets (n,) Nm, scales (n,) and travel
-    (n,) rad of the motors, where these were fitted; scales: amperes per Nm of what the
-    controller says, 1 where it says Nm; travel: over which dry friction turns.
+    friction_scale: times the deviation of friction before. offsets (n,) Nm, scales (n,) with their
+    deviations and travel (n,) rad of the motors, where these were fitted; scales: amperes per Nm of
+    what the controller says, 1 where it says Nm; travel: over which dry friction turns.
     """
 
     parameters: PowerParameters
@@ -231,6 +231,7 @@ class Fit:
     friction_scale: float
     offsets: tuple[float, ...]
     scales: tuple[float, ...]
+    scale_deviations: tuple[float, ...]
     travel: tuple[float, ...]
     currents: bool
 
@@ -368,7 +369,26 @@ class Estimate:
             least = np.minimum(inflation * np.diag(self.covariance), self.wide**2)
             factor = np.sqrt(least / safe(np.diag(self.covariance)))
             self.covariance = self.covariance * np.outer(factor, factor)
+            if self.motors is not None:
+                self.covariance += self._doubted_scales(self.motors, x)
         return self._fit(name, determined[:count], noise, fitted_with * inflation)
+
+    def _doubted_scales(self, motors: Motors, x: FloatArray) -> FloatArray:
+        """Covariance (P + E, P + E) of gains by what is not known of single links and rotors, and
+        of friction with them: in amperes it is known better than in Nm.
+        """
+        prior = self.prior
+        known = [prior.deviation[prior.index(name)] for name in ("link_mass", "rotor_inertia")]
+        shares = motors.doubts_of_scales(x[: len(prior.names)], *known)
+        found = np.zeros((len(x), len(x)))
+        for j, share in enumerate(shares):
+            along = np.zeros(len(x))
+            scale = len(x) - motors.n + j
+            along[scale] = x[scale]
+            for term in FRICTION:
+                along[prior.places(term).start + j] = -x[prior.places(term).start + j]
+            found += share * np.outer(along, along)
+        return found
 
     def _fit(self, name: str, determined: BoolArray, noise: FloatArray, inflation: float) -> Fit:
         count = len(self.prior.names)
@@ -417,6 +437,7 @@ class Estimate:
             self._friction_scale,
             tuple(extra[:n].tolist()),
             tuple(extra[n:].tolist()),
+            tuple(np.sqrt(np.diag(self.covariance)[count + n :]).tolist()),
             () if self.motors is None else tuple(self.motors.travel.tolist()),
             self.motors is not None and self.motors.currents,
         )
@@ -557,8 +578,12 @@ class Estimate:
         return step
 
     def _noise(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Deviation of a residual of each group, and residuals per independent one."""
-        missing, _ = self.rows(x)
+        return self.noise_of(self.rows(x)[0])
+
+    def noise_of(self, missing: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Deviation of a residual of each group, and residuals per independent one, of what the
+        rows miss (R,).
+        """
         noise = self._least.copy()
         correlated = np.ones(len(noise))
         for k in range(len(noise)):

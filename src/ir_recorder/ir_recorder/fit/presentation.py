@@ -43,6 +43,7 @@ def sentences(found: Fit, begun: str = "the data sheet") -> tuple[str, ...]:
         return (
             *lines,
             f"motors over 50 ms are off by {noise} {unit} (rms, by axis)",
+            *_gains(found),
             *_turning(found),
             "there are no watts in these data: losses of drives and controller stay as before",
         )
@@ -67,7 +68,22 @@ def sentences(found: Fit, begun: str = "the data sheet") -> tuple[str, ...]:
             f"noise counts {found.inflation:.1f} times: the model lacks something, and movements "
             f"that were not driven will meet it too"
         )
-    return tuple(lines)
+    return (*lines, *_gains(found))
+
+
+def _gains(found: Fit) -> tuple[str, ...]:
+    """What an ampere is worth, with standard deviations, where currents were recorded."""
+    if not found.currents:
+        return ()
+    each = (
+        f"{1.0 / scale:.3g} ({100.0 * deviation / abs(scale):.0f} %)"
+        for scale, deviation in zip(found.scales, found.scale_deviations, strict=True)
+        if scale != 0.0
+    )
+    return (
+        f"an ampere of the motors is {', '.join(each)} Nm at the joints (by axis, with its "
+        "standard deviation)" + ("" if len(found.measured) else "; friction is no surer"),
+    )
 
 
 def _turning(found: Fit) -> tuple[str, ...]:

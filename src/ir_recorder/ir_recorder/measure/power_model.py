@@ -134,6 +134,8 @@ def _soft_flow(
         conducts[k] = filling
         passes[k] = 1.0 - filling - losing
         loses[k] = losing
+    if not tangents.shape[1]:
+        return BusFlow(given, tangents, held)
     # the charge's slope s after each step: s[k] - passes[k] s[k - 1] = what the step itself changes
     own = loses[:, None] * by_top - (step * passes)[:, None] * tangents
     bands = np.stack([np.ones(len(wanted)), np.append(-passes[1:], 0.0)])
@@ -273,11 +275,14 @@ class PowerModel:
         side = friction_side(speed, samples.step, np.zeros(self.robot.n))
         return Prepared(samples, arm, speed, side, watts, centres)
 
-    def watts(self, mean: FloatArray, prepared: Prepared) -> FloatArray:
-        """Predicted W (M,) at the mains for parameters `mean` (P,)."""
+    def watts(self, mean: FloatArray, prepared: Prepared, softness: float = 0.0) -> FloatArray:
+        """Predicted W (M,) at the mains for parameters `mean` (P,); softness [J]: that of
+        `bus_flow`.
+        """
         wanted = self._wanted(mean, prepared, None)
         size = self._one(mean, LINK)
-        flow = bus_flow(self._link, wanted, prepared.samples.step, size=size)
+        step = prepared.samples.step
+        flow = bus_flow(self._link, wanted, step, softness=softness, size=size)
         return self._base(mean, prepared) + flow.watts / self._one(mean, "rectifier_efficiency")
 
     def watts_and_slopes(
