@@ -77,7 +77,6 @@ def test_money_of_a_plan_and_its_steps_are_of_one_program_or_their_difference_is
     page = report_html(plan, findings(plan))
     table = page.split('id="steps"')[1].partition("</table>")[0]
     rows = (
-        ("steps as fast as pays", own[0], own[1]),
         (SLOWER, -cheaper, slower),
         ("cycle that the money is of", cycle.energy, cycle.seconds),
     )

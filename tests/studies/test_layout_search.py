@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 
 from ir_description import cell_to_yaml, load_cell
+from ir_planner import Planner
 from ir_studies import LayoutSettings, Means, run_layout
 from ir_studies.errors import StoppedError, StudyError
 from ir_studies.layout import Layouts, search
@@ -117,6 +118,7 @@ def test_what_is_left_behind(laid: Laid, tmp_path: Path) -> None:
     page = (tmp_path / "out" / "index.html").read_text()
     assert "https://" not in page
     assert "{{" not in page
+    assert "held against the planned program of the layout as given" in page.partition("<main>")[0]
     answer = page.partition('id="answer"')[2].partition("</section>")[0]
     assert "<b>Not worth moving: " in answer or "No placement is shown to save" in answer
     assert "planned with one seed" in answer or "between 2 seeds" in answer
@@ -198,6 +200,20 @@ def test_where_the_given_placement_is_the_best_the_study_says_so(laid: Laid) -> 
     assert "Best of the others (" in said
     assert re.search(r"It takes more: [\d.]+ k?Wh, ", said)
     assert "zero lies in it" not in said
+
+
+def test_the_placement_as_given_is_the_program_that_a_plan_has() -> None:
+    """A study planned from `park`, a plan from where its program ends: one program had 408.9 kJ on
+    one page and 407.0 kJ on the other.
+    """
+    stations = ("p1", "home")
+    settings = LayoutSettings(cell="open", stations=stations, base={"x": (-0.1, 0.1)})
+    words = {"stage": "plan", "values": {}, "payload": {}, "cycle_time": 0.0, "seed": 0}
+    made = search.maker({**settings.budget, "cell_yaml": cell_to_yaml(load_cell("open"))})
+    row = made(words)
+    plan = Planner("open", clock=lambda: 0.0).plan_program(stations=stations)
+    assert row["energy_j"] == plan.report.energy
+    assert row["duration_s"] == plan.report.duration
 
 
 def test_only_the_given_placement(laid: Laid) -> None:

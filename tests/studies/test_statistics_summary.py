@@ -101,6 +101,7 @@ def test_the_page_says_first_how_far_the_prediction_is_off(
     shares: tuple[float, ...], words: str
 ) -> None:
     page = page_html(findings_of(pairs(*shares)), ASKED)
+    assert "Simulated, not measured" in page.partition("<main>")[0]
     answer = page.partition('<section id="answer">')[2].partition("</section>")[0]
     assert words in answer
     assert bool(answer) == bool(shares)

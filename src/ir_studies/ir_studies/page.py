@@ -19,7 +19,7 @@ from ir_recorder.report.tables import table
 @dataclass(frozen=True)
 class Head:
     """The head of a study's page. answer: None where nothing was found; verdict: beside the title,
-    "" without one; good: whether it is green.
+    "" without one; good: whether it is green; source: what its figures are, as a badge (HTML).
     """
 
     title: str
@@ -27,6 +27,7 @@ class Head:
     answer: Answer | None = None
     verdict: str = ""
     good: bool = False
+    source: str = ""
 
 
 def page(kind: str, head: Head, parts: Mapping[str, str], script: str = "") -> str:
@@ -36,11 +37,12 @@ def page(kind: str, head: Head, parts: Mapping[str, str], script: str = "") -> s
     own = files("ir_studies") / kind
     first = head.answer.html() if head.answer is not None else ""
     main = _filled((own / "page.html").read_text("utf-8"), parts)
+    verdict = badge(head.verdict, "good" if head.good else "open")
     return shell(
         head.title,
         head.subtitle,
         first + main,
-        badges=[badge(head.verdict, "good" if head.good else "open")] if head.verdict else [],
+        badges=[head.source, verdict] if head.verdict else [head.source],
         style=(own / "page.css").read_text("utf-8"),
         script=script,
     )

@@ -81,7 +81,7 @@ from ir_recorder.report.paid import (
     row_of,
     with_span,
 )
-from ir_recorder.report.shell import badge, shell
+from ir_recorder.report.shell import SIMULATED, badge, shell, source_badge
 from ir_recorder.report.step_table import TableValue, write_columns
 from ir_recorder.report.tables import COMPACT, bar, table
 from ir_recorder.report.whole_line import WholeLine, line_section, of_whole_line
@@ -606,7 +606,7 @@ def _simulated(members: Sequence[Member]) -> list[str]:
     origins = {member.cycle.origin for member in members} - {PREDICTED}
     if origins != {"simulated"}:
         return []
-    return ['<p class="source simulated"><b>Simulated, not measured</b></p>']
+    return [source_badge(SIMULATED, "simulated")]
 
 
 def _badge(paid: Paid, costs: Costs) -> str:

@@ -18,6 +18,14 @@ def badge(words: str, kind: str) -> str:
     return f'<p class="verdict {kind}">{text(words)}</p>'
 
 
+def source_badge(words: str, kind: str, more: str = "") -> str:
+    """What figures of a page are, beside its title. kind: simulated, measured or open."""
+    return f'<p class="source {kind}"><b>{text(words)}</b> {text(more)}</p>'
+
+
+SIMULATED = "Simulated, not measured"
+
+
 def shell(
     title: str,
     subtitle: str,

@@ -118,7 +118,6 @@ def _planned_table(steps: Sequence[PlannedMovement], cycle: Production | None) -
     ]
     if cycle is not None and cycle.own is not None:
         more = (cycle.seconds - cycle.own.seconds, cycle.energy - cycle.own.energy)
-        rows.append(_sum_row("steps as fast as pays", cycle.own.seconds, cycle.own.energy))
         rows.append(_sum_row(SLOWER, *more))
         rows.append(_sum_row("cycle that the money is of", cycle.seconds, cycle.energy))
     return table(heads, rows, "Steps of the plan")

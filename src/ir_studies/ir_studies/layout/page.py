@@ -19,7 +19,13 @@ from ir_planner.checks import JouleInterval
 from ir_recorder.analysis.production import Amount
 from ir_recorder.report.answer import Answer
 from ir_recorder.report.bars import Piece, Row, bars, tick_step
-from ir_recorder.report.costs import Costs, assumed_section, counted_with, payback
+from ir_recorder.report.costs import (
+    Costs,
+    assumed_section,
+    counted_with,
+    cycles_of_year,
+    payback,
+)
 from ir_recorder.report.files import write_output
 from ir_recorder.report.money_text import yearly_money, yearly_span
 from ir_recorder.report.number_text import (
@@ -34,6 +40,7 @@ from ir_recorder.report.number_text import (
 from ir_recorder.report.page import PAGE_START
 from ir_recorder.report.paid import Tile, between_of, counted_at, row_of
 from ir_recorder.report.shapes import body_mesh, capsule_mesh
+from ir_recorder.report.shell import source_badge
 from ir_recorder.report.step_table import write_columns
 from ir_recorder.report.tables import table
 from ir_studies.layout.placement import Known, Variable
@@ -278,6 +285,14 @@ _HEADS = (
 )  # fmt: skip
 
 
+_ZERO = "the planned program of the layout as given"
+_APART = (
+    "Plans and comparisons are held against the common program (the same stations by PTP at 100 %) "
+    "and count its cycles; what the plan itself saves comes on top."
+)
+"""What a layout is held against, and why its money is another than that of a plan's page."""
+
+
 def write_page(
     known: Sequence[Known],
     finals: Sequence[Sequence[Final]],
@@ -303,10 +318,10 @@ def page_html(
     )
     head = Head(
         f"Layout of {cell.name}",
-        f"{len(known)} placements, {len(settings.variables)} variables; energies are predicted, "
-        "nothing was driven",
+        f"{len(known)} placements, {len(settings.variables)} variables; held against {_ZERO}",
         _answer(known, finals, settings, costs),
         *_verdict(finals, costs),
+        source_badge("Predicted", "open", "nothing was driven"),
     )
     parts = {
         "tiles": _tiles(known, finals),
@@ -346,14 +361,14 @@ def _answer(
     moving = 1.0 - one.mean("moving_j") / like.mean("moving_j")
     moved = f"{percent(abs(moving)).lstrip('+')} {'less' if moving >= 0.0 else 'more'}"
     words = (
-        f"by the best placement: {kilowatt_hours(year.energy.value)} of "
+        f"by the best placement, held against {_ZERO}: {kilowatt_hours(year.energy.value)} of "
         f"{kilowatt_hours(like.mean())} at the mains a cycle, pauses included ({share}); the "
         f"movements alone take {moved}."
     )
     between = between_of(year.money, costs)
     seeds = _between_seeds(one)
     sure = [
-        "Predicted, not driven; the interval is of the robot's data alone.",
+        f"Predicted, not driven; the interval is of the robot's data alone. {_APART}",
         f"{seeds[0].upper()}{seeds[1:]}.",
         _at_limits(one, settings).strip(),
     ]
@@ -479,11 +494,13 @@ def _bars(finals: Sequence[Sequence[Final]], costs: Costs) -> str:
     if not rows:
         return ""
     like = given[0]
-    cost = costs.money(like.mean() * costs.cycles_per_year(like.mean("duration_s")))
+    pace = like.mean("duration_s")
+    cost = costs.money(like.mean() * costs.cycles_per_year(pace))
     hint = (
-        f"Zero is the layout as given: {kilowatt_hours(like.mean())} a cycle, "
-        f"{yearly_money(cost, costs.currency)} a year. Right of it a placement saves. Whisker: "
-        "90 % interval of the difference. Small: what stands how far from where it is given."
+        f"Zero is {_ZERO}: {kilowatt_hours(like.mean())} a cycle, "
+        f"{yearly_money(cost, costs.currency)} a year in shifts of {cycles_of_year(pace, costs)}, "
+        f"which all placements make. {_APART} Right of it a placement saves. Whisker: 90 % "
+        "interval of the difference. Small: what stands how far from where it is given."
     )
     drawn = bars(rows, "saved a year")
     return f'{drawn}<p class="hint">{text(hint)} {counted_with(costs)}</p>'

@@ -287,7 +287,8 @@ class Maker:
         )
         power = settings.drives(cell.robot).power(cell.robot.controller)
         stations = tuple(budget["stations"])
-        return ProgramRequest(cell, power, stations, cell.park, options, cycle_time, settings)
+        start = cell.posture(cell.cycle_start(stations))
+        return ProgramRequest(cell, power, stations, start, options, cycle_time, settings)
 
 
 def work_of(request: ProgramRequest) -> Work:

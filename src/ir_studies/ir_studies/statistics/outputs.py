@@ -16,6 +16,7 @@ from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import DASH, significant, text
 from ir_recorder.report.page import PAGE_START, folded
 from ir_recorder.report.paid import Tile, row_of
+from ir_recorder.report.shell import SIMULATED, source_badge
 from ir_recorder.report.step_table import write_columns
 from ir_recorder.report.tables import table
 from ir_studies.page import Head, page, settings_table
@@ -332,16 +333,16 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
     head = Head(
         "Predicted energies, held against simulated ones",
         f"{settings.cell}: {found.pairs} random pairs of places, planner "
-        f"{settings.planner or 'portfolio'}, objective {settings.objective.replace('_', ' ')}, "
-        f"{_robot(settings)}",
+        f"{settings.planner or 'portfolio'}, objective {settings.objective.replace('_', ' ')}",
         _answer(found),
         *_verdict(found),
+        source_badge(SIMULATED, "simulated", _robot(settings)),
     )
     parts = {
         "tiles": row_of(_tiles(found)),
         "counts": table(("", ">how many"), [(text(a), b) for a, b in counts(found)], "Counts"),
         "timings": text(_timings(found)),
-        "predicted": text(_predicted(found)[0] or "No energy was measured"),
+        "predicted": text(_predicted(found)[0] or "Nothing was driven"),
         "notes": "".join(f"<li>{text(note)}</li>" for note in notes(found, settings)),
         "alike": text(f"Alike in all pairs: {', '.join(same)}." if same else ""),
         "comparisons": _table(
