@@ -218,6 +218,35 @@ def test_nothing_is_cut_overlaps_or_scrolls_and_axe_finds_nothing(
     assert {size: found for size, found in faults.items() if found} == {}
 
 
+HEADS = """[...document.querySelectorAll("main h2")].filter((each) => {
+    const part = each.closest("section, details");
+    return each.getClientRects().length && (part.tagName !== "DETAILS" || part.open);
+}).map((each) => each.textContent)"""
+"""Headings of what is shown."""
+
+
+@pytest.mark.parametrize(
+    ("name", "heads"),
+    [
+        ("report", {"Where the energy goes", "This run in figures"}),
+        ("recordings", {"Runs in figures"}),
+        ("fleet", {"Peak, and when nobody works", "By power mode"}),
+    ],
+)
+def test_figures_of_a_run_are_on_paper(
+    browser: Any, analysis: Analysis, tmp_path: Path, name: str, heads: set[str]
+) -> None:
+    """Flows and figures of runs were on no sheet, and last sheets held a row."""
+    path = tmp_path / "page.html"
+    path.write_text(PAGES[name](analysis), encoding="utf-8")
+    page = browser.open(path, *SIZES["paper"])
+    page.call("Emulation.setEmulatedMedia", media="print")
+    page.run("dispatchEvent(new Event('beforeprint'))")
+    page.frame()
+    assert heads <= set(page.run(HEADS))
+    page.close()
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
     "name", ["report", pytest.param("before and after", marks=pytest.mark.long)]
@@ -227,20 +256,16 @@ def test_paper_from_a_phone_has_every_section_that_paper_from_a_desk_has(
 ) -> None:
     path = tmp_path / "page.html"
     path.write_text(PAGES[name](analysis), encoding="utf-8")
-    shown = """[...document.querySelectorAll("main h2")].filter((each) => {
-        const part = each.closest("section, details");
-        return each.getClientRects().length && (part.tagName !== "DETAILS" || part.open);
-    }).map((each) => each.textContent)"""
     read = {}
     printed = {}
     for size in ("desk", "phone"):
         page = browser.open(path, *SIZES[size], touch=size == "phone")
-        read[size] = page.run(shown)
+        read[size] = page.run(HEADS)
         page.call("Emulation.setEmulatedMedia", media="print")
         page.size(*SIZES["paper"])
         page.run("dispatchEvent(new Event('beforeprint'))")
         page.frame()
-        printed[size] = page.run(shown)
+        printed[size] = page.run(HEADS)
         page.run("dispatchEvent(new Event('afterprint'))")
         page.close()
     assert len(read["phone"]) < len(read["desk"])  # the phone folds

@@ -101,6 +101,7 @@ def comparison_html(compared: Sequence[Compared], costs: Costs | None = None) ->
         "figures": _figures(compared, names),
         "front": front_part(_points(analyses, names)),
         "steps": _steps(analyses, names),
+        "steps_paper": " paper" if len(names) <= _BESIDE else "",
         "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
     }
     main = re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("compare.html"))

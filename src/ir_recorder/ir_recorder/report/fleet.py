@@ -472,14 +472,20 @@ def fleet_html(
         _section("Month by month: driven and predicted", _months(members), "months"),
         _problems([each for each in left_out if DRIVES_ONLY not in each]),  # the table says it
         _all_robots(members, robots, prices),
-        folded(_section("Peak, and when nobody works", _around_the_clock(members, robots, prices))),
+        folded(
+            _section("Peak, and when nobody works", _around_the_clock(members, robots, prices)),
+            paper=True,
+        ),
         folded(line_section(fleet_of_line(members, prices), prices)),
-        folded(_section("By power mode", _matrix("mode", by_mode(known, prices), summed, basis))),
+        folded(
+            _section("By power mode", _matrix("mode", by_mode(known, prices), summed, basis)),
+            paper=True,
+        ),
         folded(
             _section(
                 "By movement and pause",
                 _matrix("movement", by_movement(known, prices), summed, basis),
-            )
+            ),
         ),
         assumed_section(prices),
     ]
@@ -771,9 +777,9 @@ def _robot_row(robot: Robot, members: Sequence[Member], costs: Costs) -> tuple[s
     made = ", ".join((robot.cell, _origins(own), *([DRIVES_ONLY] if robot.drives_only else ())))
     how = "" if robot.driven else " as planned"
     each = f"a part{how} {kilowatt_hours(part)}, {money_of_thousand(part, costs)}"
-    stands = f"{COMMON}, predicted" if _stands(robot) else ""
-    today = stands or computed_words(*(member.cycle for member in own))
-    today = f"<small>{text(today)}</small>" if today else ""
+    computed = computed_words(*(member.cycle for member in own))
+    each += f"; {computed}" if computed else ""
+    today = f"<small>{COMMON}, predicted</small>" if _stands(robot) else ""
     return (
         f"{text(robot.name)}<small>{text(made)}</small><small>{text(each)}</small>",
         f"{_yearly(robot.now, costs)}{today}",

@@ -379,7 +379,7 @@ def run_tiles(analysis: Analysis) -> str:
     parts = _parts(program, analysis.recording.origin)
     own = _html([_whole(analysis, program), *parts, _clearance(analysis)])
     return (
-        '<details class="part"><summary><h2>This run in figures</h2></summary>'
+        '<details class="part paper" id="run"><summary><h2>This run in figures</h2></summary>'
         f'<div class="tiles">{own}</div></details>'
     )
 
