@@ -340,6 +340,9 @@ def test_the_terminal_says_what_the_pages_show(walked: Analysis) -> None:
             assert figure.shows(exact), (line, exact)
             seen.add(start)
     assert "this run" in seen
+    assert any("computed: pauses at full length" in line for line in said) == (
+        cycle.computed is not None
+    )
     assert walked.savings is not None
     total = next(line for line in savings_lines(walked) if line.startswith("total:"))
     joules = [figure for figure in READ.figures_in(total, "total") if figure.kind == "J"][:2]

@@ -46,8 +46,10 @@ from ir_recorder import (
     summary,
 )
 from ir_recorder.analysis.checks import row_name
+from ir_recorder.analysis.production import production_of
 from ir_recorder.format import contents
 from ir_recorder.report import write_report
+from ir_recorder.report.costs import computed_words
 from ir_recorder.report.number_text import interval, number
 from ir_recorder.report.picture import write_picture
 from ir_recorder.report.tables import savings_lines
@@ -96,6 +98,9 @@ class DemoOutcome:
             full = program.unshortened
             cut = f"pauses of {full.full_pauses:.0f} s instead of {full.run_pauses:.0f} s"
             lines.append(f"with full pauses (computed): {_total(full.energy, full.seconds)}; {cut}")
+            cycle = production_of(self.analysis)
+            if cycle is not None and computed_words(cycle):
+                lines.append(f"    {computed_words(cycle)}")
         return "\n".join(lines)
 
     def _parts(self) -> str:
@@ -443,9 +448,8 @@ class Demonstration:
                 f"{at.movement + 1}/{at.total} {at.phase}, {at.remaining:.0f} s left"
             ),
         )
-        self._progress.end(
-            f"{run.executed} steps, {run.duration:.1f} s, {run.energy / 1000.0:.1f} kJ simulated"
-        )
+        # its joules are those of the recording, which begins and ends with a step
+        self._progress.end(f"{run.executed} steps, {run.duration:.1f} s")
 
     def _wake(self) -> None:
         """Send the Wake-on-LAN packet that the program runner would send."""

@@ -206,7 +206,7 @@ class RobotsDemonstration:
             robot: partial(clients[robot].run_program, steps) for robot, steps in programs.items()
         }
         runs, failed = driven_together(drives)
-        said = [f"{r} {run.duration:.1f} s, {run.energy / 1e3:.1f} kJ" for r, run in runs.items()]
+        said = [f"{robot} {run.duration:.1f} s" for robot, run in runs.items()]
         self._progress.end("; ".join([*said, *(["ended early"] if failed else [])]))
         return failed
 
