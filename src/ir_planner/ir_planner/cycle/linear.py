@@ -41,12 +41,14 @@ class LinearProgram:
     _begins: list[int] = field(default_factory=lambda: [0])
     _row_low: list[float] = field(default_factory=list)
     _row_high: list[float] = field(default_factory=list)
+    _columns: list[Terms] = field(default_factory=list)
     _relaxed: highspy.Highs | None = None
 
     def variable(
         self, low: float = 0.0, high: float = np.inf, *, cost: float = 0.0, whole: bool = False
     ) -> int:
-        """A new variable's index."""
+        """A new variable's index; every `column` comes after them."""
+        assert not self._columns
         self.low.append(low)
         self.high.append(high)
         self.cost.append(cost)
@@ -58,13 +60,29 @@ class LinearProgram:
         """A new variable that is 0 or 1."""
         return self.variable(0.0, 1.0, cost=cost, whole=True)
 
-    def row(self, terms: Terms, *, low: float = -np.inf, high: float = np.inf) -> None:
-        """A new row."""
+    def column(self, terms: Terms, *, cost: float) -> int:
+        """A new variable of at least 0 that stands in rows which are there already, by their
+        number; its index.
+        """
+        self._columns.append(terms)
+        self.low.append(0.0)
+        self.high.append(np.inf)
+        self.cost.append(cost)
+        self.whole.append(0)
+        return len(self.low) - 1
+
+    def close(self, variable: int) -> None:
+        """Hold a variable at 0 from now on."""
+        self.high[variable] = 0.0
+
+    def row(self, terms: Terms, *, low: float = -np.inf, high: float = np.inf) -> int:
+        """A new row's number; no `column` stands in it."""
         self._indices.extend(terms.keys())
         self._values.extend(terms.values())
         self._begins.append(len(self._indices))
         self._row_low.append(low)
         self._row_high.append(high)
+        return len(self._row_high) - 1
 
     def relaxed(self, fixed: Mapping[int, float] | None = None) -> LinearAnswer:
         """The least cost where whole variables may be anything within their bounds; it goes on from
@@ -73,8 +91,9 @@ class LinearProgram:
         if self._relaxed is None:
             self._relaxed = self._empty()
         solver = self._relaxed
-        self._bounds(solver, fixed or {})
         self._add_rows(solver)
+        self._add_columns(solver)
+        self._bounds(solver, fixed or {})
         solver.run()
         if solver.getModelStatus() != highspy.HighsModelStatus.kOptimal:
             solver.clearSolver()
@@ -95,21 +114,25 @@ class LinearProgram:
         stopped: Callable[[], bool] | None = None,
         gap: float = 1e-7,
         limit: float = np.inf,
+        first: bool = False,
     ) -> LinearAnswer:
         """The least cost. fixed: values by variable; loose: whole variables that needn't be whole;
         start: a point to begin with, its whole variables count; stopped: asked in
         between, the search ends where it says so; gap: relative, at which the search may end;
-        limit: only what costs less is looked for.
+        limit: only what costs less is looked for; first: the first point found will do.
         """
         solver = self._empty()
-        self._bounds(solver, fixed or {})
         self._add_rows(solver)
+        self._add_columns(solver)
+        self._bounds(solver, fixed or {})
         count = len(self.low)
         kinds = np.array(self.whole, dtype=np.uint8)
         kinds[list(loose)] = 0
         solver.changeColsIntegrality(count, np.arange(count, dtype=np.int32), kinds)
         solver.setOptionValue("mip_rel_gap", gap)
         solver.setOptionValue("objective_bound", limit)
+        if first:
+            solver.setOptionValue("mip_max_improving_sols", 1)
         if stopped is not None:
             _interrupt(solver, stopped)
         if start is not None:
@@ -134,12 +157,29 @@ class LinearProgram:
         solver.setOptionValue("primal_feasibility_tolerance", _FEASIBILITY)
         solver.setOptionValue("mip_feasibility_tolerance", _FEASIBILITY)
         none = np.zeros(0, dtype=np.int32)
-        count = len(self.low)
+        count = len(self.low) - len(self._columns)
         solver.addCols(
-            count, np.array(self.cost), np.array(self.low), np.array(self.high),
+            count, np.array(self.cost[:count]),
+            np.array(self.low[:count]), np.array(self.high[:count]),
             0, np.zeros(count, dtype=np.int32), none, np.zeros(0),
         )  # fmt: skip
         return solver
+
+    def _add_columns(self, solver: highspy.Highs) -> None:
+        """Columns that the solver doesn't have yet."""
+        first = solver.getNumCol()
+        count = len(self.low) - first
+        if count == 0:
+            return
+        new = self._columns[-count:]
+        begins = np.cumsum([0, *(len(terms) for terms in new)])
+        rows = np.concatenate([list(terms) for terms in new]).astype(np.int32)
+        values = np.concatenate([list(terms.values()) for terms in new])
+        solver.addCols(
+            count, np.array(self.cost[first:]),
+            np.array(self.low[first:]), np.array(self.high[first:]),
+            len(rows), begins[:-1].astype(np.int32), rows, values,
+        )  # fmt: skip
 
     def _bounds(self, solver: highspy.Highs, fixed: Mapping[int, float]) -> None:
         low = np.array(self.low)

@@ -2,9 +2,10 @@
 
 A robot's clock begins when it leaves the stop that closes its cycle. Each movement and each range
 of a stay has a duration of its own, zero unless chosen; starts flow along the hops with their
-movements, so orders need no large constants. Energies of movements are bounded by tangents, added
-where a solution is. Robots differ by the phase of their clocks; two activities that exclude each
-other are separated by a whole number of cycles.
+movements, so orders need no large constants. Duration and energy of a movement are a mean of the
+corners of a polygon below its curve; where a solution lies below the curve, the tangent there cuts
+corners off. Robots differ by the phase of their clocks; two activities that exclude each other are
+separated by a whole number of cycles.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from dataclasses import dataclass, field
 from ir_planner.cycle import LinearProgram
 from ir_studies.cells.instance import (
     DynamicActivity,
+    EnergyCurve,
     HopMovement,
     Instance,
     InstanceRobot,
@@ -29,9 +31,19 @@ from ir_studies.cells.instance import (
 )
 from ir_values.arrays import FloatArray
 
-_FIRST_TANGENTS = 5
+_FIRST_TANGENTS = 9
 _SLACK = 1e-7  # s, of bounds that were derived
-_SAME = 1e-7  # of a curve: a tangent that close is there already
+_SAME = 1e-7  # of a slope: a tangent that close is there already
+_ON_IT = 1e-9  # J: a corner that near to a tangent lies on it
+
+
+@dataclass(frozen=True)
+class _Corner:
+    """Of the polygon below a curve of energies; its weight is a variable."""
+
+    weight: int
+    duration: float
+    energy: float
 
 
 @dataclass(frozen=True)
@@ -41,9 +53,9 @@ class _Moving:
     hop: DynamicActivity
     movement: HopMovement
     on: int
-    duration: int
-    energy: int
     most: float
+    row: int  # in which the weights of its corners are together what `on` is
+    corners: list[_Corner]  # by duration
 
 
 @dataclass(frozen=True)
@@ -54,7 +66,6 @@ class _Staying:
     place: int
     range: ModeRange
     on: int
-    duration: int
 
 
 @dataclass
@@ -83,6 +94,8 @@ class CellModel:
         self.moving: list[_Moving] = []
         self.staying: list[_Staying] = []
         self.separations: dict[tuple[int, int], int] = {}
+        self._duration: dict[int, int] = {}  # of an activity, zero unless it is done
+        self._duration_row: dict[int, int] = {}
         self._clocks = [self._clock(robot) for robot in instance.robots]
         self._stops = {s.number: s for robot in instance.robots for s in robot.stops}
         self._hops = {h.number: h for robot in instance.robots for h in robot.hops}
@@ -97,8 +110,6 @@ class CellModel:
             self._lag(event, lag)
         self._fits()
         self._conflicts()
-        for moving in self.moving:
-            self._first_tangents(moving)
 
     # Bounds on each clock.
 
@@ -140,33 +151,44 @@ class CellModel:
         p = self.program
         for hop in clock.robot.hops:
             room = clock.ends[hop.number][1] - clock.begins[hop.number][0]
+            took: Terms = {}
             for movement in hop.movements:
-                curve = movement.curve
-                most = min(curve.most, room + _SLACK)
-                if most < curve.least:
+                most = min(movement.curve.most, room + _SLACK)
+                if most < movement.curve.least:
                     continue
                 on = p.binary()
-                moving = _Moving(
-                    hop, movement, on, p.variable(), p.variable(-math.inf, cost=1.0), most
-                )
-                p.row({moving.duration: 1.0, on: -curve.least}, low=0.0)
-                p.row({moving.duration: 1.0, on: -most}, high=0.0)
+                corners = [
+                    _Corner(p.variable(cost=energy), duration, energy)
+                    for duration, energy in _first_corners(movement.curve, most)
+                ]
+                row = p.row({on: -1.0} | {c.weight: 1.0 for c in corners}, low=0.0, high=0.0)
+                took |= {c.weight: c.duration for c in corners}
+                moving = _Moving(hop, movement, on, most, row, corners)
                 self.moving.append(moving)
                 self._moves_of.setdefault(hop.number, []).append(moving)
+            self._lasts(hop.number, took)
         for stop in clock.robot.stops:
             room = self.instance.cycle if stop.closes else clock.ends[stop.number][1]
+            took = {}
             for place in stop.places:
                 for each in stay_ranges(stop, place, clock.robot.modes):
                     most = min(each.most, room - clock.begins[stop.number][0] + _SLACK)
                     if most < each.least:
                         continue
-                    on = p.binary()
-                    duration = p.variable(cost=each.power)
-                    p.row({duration: 1.0, on: -each.least}, low=0.0)
-                    p.row({duration: 1.0, on: -most}, high=0.0)
-                    staying = _Staying(stop, place.number, each, on, duration)
+                    on = p.binary(cost=each.power * each.least)
+                    longer = p.variable(cost=each.power)
+                    p.row({longer: 1.0, on: each.least - most}, high=0.0)
+                    took |= {on: each.least, longer: 1.0}
+                    staying = _Staying(stop, place.number, each, on)
                     self.staying.append(staying)
                     self._stays_of.setdefault(stop.number, []).append(staying)
+            self._lasts(stop.number, took)
+
+    def _lasts(self, activity: int, took: Terms) -> None:
+        """A variable for what an activity takes."""
+        duration = self.program.variable()
+        self._duration[activity] = duration
+        self._duration_row[activity] = self.program.row(took | {duration: -1.0}, low=0.0, high=0.0)
 
     def _flows(self, clock: _Clock) -> None:
         p = self.program
@@ -204,10 +226,10 @@ class CellModel:
         v = stop.number
         arrive: Terms = {clock.start[v]: -1.0}
         depart: Terms = {clock.start[v]: -1.0}
-        depart |= {s.duration: -1.0 for s in self._stays_of.get(v, ())}
+        depart[self._duration[v]] = -1.0
         for hop in clock.robot.hops:
             if hop.end == v:
-                arrive |= {m.duration: 1.0 for m in self._moves_of.get(hop.number, ())}
+                arrive[self._duration[hop.number]] = 1.0
                 if hop.number in clock.leave:
                     arrive[clock.leave[hop.number]] = 1.0
             if hop.start == v and hop.number in clock.leave:
@@ -319,8 +341,11 @@ class CellModel:
         clock = self._clock_of(event.end_of)
         if self._stops[event.end_of].closes:
             return {clock.phase: 1.0}
-        terms = {clock.phase: 1.0, clock.start[event.end_of]: 1.0}
-        return terms | {s.duration: 1.0 for s in self._stays_of.get(event.end_of, ())}
+        return {
+            clock.phase: 1.0,
+            clock.start[event.end_of]: 1.0,
+            self._duration[event.end_of]: 1.0,
+        }
 
     def _lag(self, event: _Event, lag: TimeLag) -> None:
         """later - earlier >= bound, less `spare` for each of the two that doesn't take place."""
@@ -450,47 +475,64 @@ class CellModel:
         start: Terms = {clock.phase: 1.0}
         if activity in self._stops:
             start[clock.start[activity]] = 1.0
-            stays = {s.duration: 1.0 for s in self._stays_of.get(activity, ())}
-            return start, start | stays, 0.0, 0.0
+            return start, start | {self._duration[activity]: 1.0}, 0.0, 0.0
         if activity in clock.leave:
             start[clock.leave[activity]] = 1.0
-        end = start | {m.duration: 1.0 for m in self._moves_of.get(activity, ())}
+        end = start | {self._duration[activity]: 1.0}
         early = clock.begins[activity][0]
         early_end = clock.ends[activity][0]
         on = self._on(activity)
         start = start | dict.fromkeys(on, -early)
         return start, end | dict.fromkeys(on, -early_end), early, early_end
 
-    # Tangents.
-
-    def _first_tangents(self, moving: _Moving) -> None:
-        curve = moving.movement.curve
-        low = curve.least
-        high = moving.most
-        ratio = (high / low) ** (1.0 / max(_FIRST_TANGENTS - 1, 1))
-        points = [low * ratio**k for k in range(_FIRST_TANGENTS)]
-        points.append(min(max(curve.cheapest(), low), high))
-        for duration in sorted(points):
-            self._tangent(moving, duration)
-
-    def _tangent(self, moving: _Moving, duration: float) -> None:
-        slope, zero = moving.movement.curve.tangent(duration)
-        self.program.row({moving.energy: 1.0, moving.duration: -slope, moving.on: -zero}, low=0.0)
+    # Curves.
 
     def refine(self, values: FloatArray, close: float) -> int:
-        """Add tangents where a solution's energy is more than `close` below the curve; how many."""
-        added = 0
+        """Cut the polygons by tangents where a solution's energy is more than `close` below the
+        curve; how many.
+        """
+        cut = 0
         for moving in self.moving:
             on = float(values[moving.on])
             if on < 1e-3:
                 continue
-            curve = moving.movement.curve
-            duration = min(max(float(values[moving.duration]) / on, curve.least), moving.most)
-            slope, zero = curve.tangent(duration)
-            if (slope * duration + zero) * on - float(values[moving.energy]) > close * on:
-                self._tangent(moving, duration)
-                added += 1
-        return added
+            duration = self._took(moving, values) / on
+            energy = sum(float(values[c.weight]) * c.energy for c in moving.corners) / on
+            slope, zero = moving.movement.curve.tangent(duration)
+            if slope * duration + zero - energy > close:
+                self._cut(moving, slope, zero)
+                cut += 1
+        return cut
+
+    def _took(self, moving: _Moving, values: FloatArray) -> float:
+        """Duration of a movement [s], zero unless it is done."""
+        return sum(float(values[c.weight]) * c.duration for c in moving.corners)
+
+    def _cut(self, moving: _Moving, slope: float, zero: float) -> None:
+        """Cut off the corners below a line; the shortest and the longest duration stay."""
+        corners = moving.corners
+        above = [c.energy - slope * c.duration - zero for c in corners]
+        below = [each < -_ON_IT for each in above]
+        kept: list[_Corner] = []
+        for k, corner in enumerate(corners):
+            if k > 0 and below[k - 1] != below[k]:
+                share = above[k - 1] / (above[k - 1] - above[k])
+                duration = corners[k - 1].duration
+                duration += min(max(share, 0.0), 1.0) * (corner.duration - duration)
+                kept.append(self._corner(moving, duration, slope, zero))
+            if not below[k]:
+                kept.append(corner)
+                continue
+            self.program.close(corner.weight)
+            if k in (0, len(corners) - 1):
+                kept.append(self._corner(moving, corner.duration, slope, zero))
+        moving.corners[:] = kept
+
+    def _corner(self, moving: _Moving, duration: float, slope: float, zero: float) -> _Corner:
+        energy = slope * duration + zero
+        row = self._duration_row[moving.hop.number]
+        weight = self.program.column({moving.row: 1.0, row: duration}, cost=energy)
+        return _Corner(weight, duration, energy)
 
     # Answers.
 
@@ -506,6 +548,29 @@ class CellModel:
         """All other whole variables."""
         within = set(self.wholes_within(robots))
         return [k for k, whole in enumerate(self.program.whole) if whole and k not in within]
+
+    def of_others(self, robots: set[int], values: FloatArray) -> dict[int, float]:
+        """What a solution decides of all but some robots, and of what keeps them apart."""
+        others = set(range(len(self._clocks))) - robots
+        return {k: float(round(values[k])) for k in self.wholes_within(others)}
+
+    def of_places(self, values: FloatArray) -> dict[int, float]:
+        """What isn't chosen where a solution's places are kept."""
+        kept = {(s.stop.number, s.place) for s in self.staying if values[s.on] > 0.5}
+        points = {
+            place.point
+            for stop in self._stops.values()
+            for place in stop.places
+            if (stop.number, place.number) in kept
+        }
+        elsewhere = [s.on for s in self.staying if (s.stop.number, s.place) not in kept]
+        elsewhere += [m.on for m in self.moving if not {m.movement.start, m.movement.end} <= points]
+        return dict.fromkeys(elsewhere, 0.0)
+
+    def of_orders(self, values: FloatArray) -> dict[int, float]:
+        """What isn't done where a solution's orders are kept."""
+        done = {m.hop.number for m in self.moving if values[m.on] > 0.5}
+        return {m.on: 0.0 for m in self.moving if m.hop.number not in done}
 
     def choices(self, values: FloatArray) -> dict[int, float]:
         """What is decided by a solution: whole variables, rounded."""
@@ -525,7 +590,7 @@ class CellModel:
                 moving = moves[at]
                 at = moving.hop.number
                 curve = moving.movement.curve
-                took = float(min(max(values[moving.duration], curve.least), curve.most))
+                took = min(max(self._took(moving, values), curve.least), curve.most)
                 done.append(
                     ScheduledActivity(
                         moving.hop.number,
@@ -539,7 +604,7 @@ class CellModel:
                 time += took
                 at = moving.hop.end
                 stay = stays[at]
-                took = float(values[stay.duration])
+                took = float(values[self._duration[at]])
                 done.append(
                     ScheduledActivity(
                         at, stay.place, stay.range.mode, time, took, stay.range.power * took
@@ -556,6 +621,26 @@ class _Event:
 
     start_of: int = -1
     end_of: int = -1
+
+
+def _first_corners(curve: EnergyCurve, most: float) -> list[tuple[float, float]]:
+    """Duration [s] and energy [J] of the corners that a few tangents leave, up to a duration."""
+    low = curve.least
+    ratio = (most / low) ** (1.0 / (_FIRST_TANGENTS - 1))
+    points = {low * ratio**k for k in range(_FIRST_TANGENTS - 1)} | {most}
+    points.add(min(max(curve.cheapest(), low), most))
+    lines: list[tuple[float, float]] = []
+    for duration in sorted(points):
+        line = curve.tangent(duration)
+        if not lines or line[0] - lines[-1][0] > _SAME * max(abs(line[0]), abs(lines[-1][0])):
+            lines.append(line)
+    durations = [low]
+    for (slope, zero), (steeper, zero_2) in itertools.pairwise(lines):
+        crossing = (zero - zero_2) / (steeper - slope)
+        durations.append(min(max(crossing, durations[-1]), most))
+    if most > low:
+        durations.append(most)
+    return [(t, max(slope * t + zero for slope, zero in lines)) for t in durations]
 
 
 def _sum(terms: Mapping[int, float], more: Mapping[int, float], factor: float) -> Terms:

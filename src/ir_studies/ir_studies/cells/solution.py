@@ -2,18 +2,23 @@
 
 Rounds of the whole model: solve, hold what was decided, take the durations of least energy, add
 tangents there, and again until the bound meets the energy. Cells of many robots first get a
-schedule robot by robot: two at a time are decided while the others are relaxed, then neighbours
-are decided anew.
+schedule robot by robot, two at a time decided while the others are relaxed, or the first that the
+whole model gives. Some robots decided and all others relaxed bound the energy from below, sooner
+than the whole does. Then part of the schedule is decided anew while the rest is held: one robot,
+the places of all, or their orders, as long as that gains.
 """
 
 from __future__ import annotations
 
+import functools
+import itertools
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ir_planner.cycle import LinearAnswer
 from ir_studies.cells.cell_model import CellModel
 from ir_studies.cells.instance import Instance, InstanceRobot, Schedule
 from ir_values.arrays import FloatArray
@@ -21,13 +26,17 @@ from ir_values.arrays import FloatArray
 PROVED = 1e-6
 """Relative difference of energy and bound from which on a schedule counts as proved."""
 
-_MANY = 4  # robots, from which on they are decided one after the other first
+_MANY = 4  # robots, from which on parts are decided one after the other first
 _ROOT_ROUNDS = 8
 _MOST_ROUNDS = 30
 _CLOSE = 2e-9  # of the energy: what a tangent may miss a curve by
 _COARSE = 2e-6  # the same before anything is decided
 _PART_GAP = 2e-3  # of a part of the cell
-_PART_SHARE = 0.1  # of the seconds, for one part
+_PART_SHARE = 0.04  # of the seconds, for one part
+_FIRST_SHARE = 0.25  # for a first schedule of the whole
+_BOUND_SHARE = 0.4  # for the bound of some robots
+_ANEW_SHARE = 0.1  # for a part that is decided anew
+_WHOLE_SHARE = 0.1  # is left for the bound
 
 
 @dataclass(frozen=True)
@@ -117,7 +126,7 @@ class _Search:
         """Everything, in turn."""
         self._root()
         if self._bound < np.inf and len(self._instance.robots) >= _MANY:
-            self._one_after_the_other()
+            self._part_by_part()
         rounds = 0
         while self._left > 0.0 and not self._done and rounds < _MOST_ROUNDS:
             self._whole()
@@ -160,32 +169,84 @@ class _Search:
             values = answer.values
             if not self._model.refine(values, _CLOSE * abs(answer.cost)):
                 break
+        self._keep(values)
+        return True
+
+    def _keep(self, values: FloatArray) -> None:
+        """Take a point's schedule if it is the best."""
         schedule = self._model.schedule(values)
         if self._best is None:
             self._first = time.process_time() - self._begun
         if self._best is None or schedule.energy < self._best.energy:
             self._best = schedule
             self._point = values
-        return True
 
     # Many robots.
 
-    def _one_after_the_other(self) -> None:
-        for together in (2, 3):
-            if self._relax_and_fix(together):
-                break
-        else:
+    def _part_by_part(self) -> None:
+        """A schedule, and parts of it decided anew as long as that gains."""
+        if not (self._relax_and_fix(2) or self._first_of_all() or self._relax_and_fix(3)):
             return
-        count = len(self._instance.robots)
-        gains = True
-        while gains and self._left > 0.5 * self._seconds and not self._done:
-            before = self._best.energy if self._best else np.inf
-            for first in range(count):
-                self._anew({first, (first + 1) % count})
-            gains = self._best is not None and self._best.energy < before * (1.0 - 1e-5)
+        if not self._done:
+            self._bound_by_robots()
+            self._improve()
+
+    def _improve(self) -> None:
+        """Decide parts anew in turn, until none gains."""
+        assert self._point is not None
+        self._hold(self._point)
+        model = self._model
+        robots = range(len(self._instance.robots))
+        parts: list[Callable[[FloatArray], dict[int, float]]] = [
+            *(functools.partial(model.of_others, {robot}) for robot in robots),
+            model.of_places,
+            model.of_orders,
+        ]
+        idle = 0
+        for held in itertools.cycle(parts):
+            if self._done or self._left < self._seconds * _WHOLE_SHARE or idle == len(parts):
+                return
+            idle = 0 if self._anew(held) else idle + 1
+
+    def _first_of_all(self) -> bool:
+        """The first schedule that the whole model gives."""
+        answer = self._model.program.solve(
+            stopped=after(min(self._left, self._seconds * _FIRST_SHARE)), gap=_PART_GAP, first=True
+        )
+        self._bound = max(self._bound, answer.bound)
+        if answer.values is None:
+            return False
+        self._keep(answer.values)
+        return True
+
+    def _bound_by_robots(self) -> None:
+        """Raise the bound by each robot alone, then by those together that raise it most."""
+        root = self._bound
+        end = self._left - _BOUND_SHARE * self._seconds
+        robots = range(len(self._instance.robots))
+        alone = {robot: self._bound_of({robot}).bound for robot in robots if self._left > end}
+        order = sorted(alone, key=lambda robot: (-alone[robot], robot))
+        together = set(order[:1])
+        for robot in order[1:]:
+            if self._done or self._left <= end or alone[robot] <= root * (1.0 + PROVED):
+                return
+            if self._bound_of(together | {robot}).finished:
+                together.add(robot)
+
+    def _bound_of(self, robots: set[int]) -> LinearAnswer:
+        """Decide some robots while the others are relaxed."""
+        answer = self._model.program.solve(
+            loose=self._model.wholes_outside(robots),
+            stopped=after(min(self._left, self._seconds * _ANEW_SHARE)),
+            gap=_PART_GAP / 100.0,
+        )
+        self._bound = max(self._bound, answer.bound)
+        return answer
 
     def _relax_and_fix(self, together: int) -> bool:
-        """Decide robots in turn, the next ones with them, the rest relaxed."""
+        """Decide robots in turn, the next ones with them, the rest relaxed; two at a time only
+        where that is quick.
+        """
         model = self._model
         robots = len(self._instance.robots)
         fixed: dict[int, float] = {}
@@ -199,25 +260,26 @@ class _Search:
                 stopped=after(min(self._left, self._seconds * _PART_SHARE * together / 2.0)),
                 gap=_PART_GAP,
             )
-            if answer.values is None:
+            if answer.values is None or (together == 2 and not answer.finished):
                 return False
             values = answer.values
             for index in model.wholes_within(set(range(first + 1))):
                 fixed[index] = float(round(values[index]))
-        return values is not None and self._hold(values)
+        assert values is not None
+        self._keep(values)
+        return True
 
-    def _anew(self, robots: set[int]) -> None:
-        """Decide some robots again while the others keep to what they do."""
-        if self._point is None or self._left <= 0.0:
-            return
-        model = self._model
-        others = set(range(len(self._instance.robots))) - robots
-        fixed = {index: float(round(self._point[index])) for index in model.wholes_within(others)}
-        answer = model.program.solve(
-            fixed=fixed,
+    def _anew(self, held: Callable[[FloatArray], dict[int, float]]) -> bool:
+        """Decide again what isn't held of the best schedule; whether that gains."""
+        assert self._point is not None
+        assert self._best is not None
+        before = self._best.energy
+        answer = self._model.program.solve(
+            fixed=held(self._point),
             start=self._point,
-            stopped=after(min(self._left, self._seconds * _PART_SHARE)),
+            stopped=after(self._seconds * _ANEW_SHARE),
             gap=_PART_GAP / 10.0,
         )
         if answer.values is not None:
             self._hold(answer.values)
+        return self._best.energy < before * (1.0 - PROVED)
