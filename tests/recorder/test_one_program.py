@@ -174,6 +174,22 @@ def test_how_far_a_run_is_from_its_plan_is_one_figure(
         assert "as planned" not in answer
 
 
+def test_what_a_robot_takes_until_its_next_cycle_is_named(analysis: Analysis) -> None:
+    """A year counts the cycles of the common program, and nothing of the wait for the next one."""
+    found = analysis.savings
+    cycle = production_of(analysis)
+    assert found is not None
+    assert cycle is not None
+    longer = replace(found.movements, seconds=cycle.seconds + 2.0 - found.pauses.seconds)
+    event = replace(analysis.recording.savings[0], savings=replace(found, movements=longer))
+    late = analyse(replace(analysis.recording, savings=(event,)))
+    page = plain(report_html(late, ()))
+    (watts,) = re.findall(r"<td[^>]*>stand on motors</td><td[^>]*>([\d ]+) W</td>", page)
+    words = re.findall(r"ends 2\.00 s sooner, .* not counted \(at most ([\d.]+) Wh a cycle\)", page)
+    assert float(words[0]) == pytest.approx(2.0 * float(watts) / 3600.0, rel=0.01)
+    assert "is not counted (" not in plain(report_html(plan_of(analysis, 2.0, 300.0), ()))
+
+
 def test_nights_are_named_beside_each_year(analysis: Analysis) -> None:
     """A year as driven and the planned one were 452 and 235 EUR: nights on brakes in one, in
     hibernation in the other.

@@ -12,6 +12,7 @@ from ir_description import Cell, DescriptionFileError, load_power_data
 from ir_description.files import plain_yaml
 from ir_msgs_py.savings import Saving
 from ir_recorder.analysis import Analysis
+from ir_recorder.analysis.predicted_power import MOTORS
 from ir_recorder.analysis.production import (
     HIBERNATION,
     Amount,
@@ -345,11 +346,12 @@ def costs_section(analysis: Analysis, costs: Costs) -> str:
     )
     notes = "".join(f" {note[0].upper()}{note[1:]}." for note in cycle.notes)
     pace = own_pace(cycle)
+    waits = _waits(cycle, costs, idle_watts(analysis))
     return (
         '<section id="costs"><h2>What a cycle costs</h2>'
         f"{table(heads, rows, 'What a cycle costs')}"
         f'<p class="hint">{text(origin)}{_saving_is(cycle)}. A year has '
-        f"{cycles_of_year(cycle.pace, costs)}{_waits(cycle, costs)}.{text(notes)}"
+        f"{cycles_of_year(cycle.pace, costs)}{waits}.{text(notes)}"
         f"{_bridge(analysis, cycle)}{text(f' {pace}' if pace else '')} {counted_with(costs)}</p>"
         "</section>"
     )
@@ -403,9 +405,9 @@ def _saving_is(cycle: Production) -> str:
     return "; programs and savings are predicted. Small: 90 % intervals, whose ends add up"
 
 
-def _waits(cycle: Production, costs: Costs) -> str:
+def _waits(cycle: Production, costs: Costs, rests: Mapping[str, float]) -> str:
     """Why the cycles of a year are longer than the cycle, where that shows, and what the common
-    program needs for them where it is slower; "" elsewhere.
+    program needs for them where it is slower; "" elsewhere. rests: W at rest by power mode.
     """
     if cycle.savings is None:
         return ""
@@ -414,10 +416,14 @@ def _waits(cycle: Production, costs: Costs) -> str:
         return f"; the common program would need {more / 3600.0:.0f} h more for them"
     if seconds(cycle.pace) == seconds(cycle.seconds):
         return ""
-    sooner = seconds(cycle.pace - cycle.seconds)
+    sooner = cycle.pace - cycle.seconds
+    watts_then = rests.get(MOTORS)
+    taken = (
+        "" if watts_then is None else f" (at most {kilowatt_hours(sooner * watts_then)} a cycle)"
+    )
     return (
-        f" as in the common program; this cycle ends {sooner} sooner, and what the robot takes "
-        "while it waits for the next is not counted"
+        f" as in the common program; this cycle ends {seconds(sooner)} sooner, and what the robot "
+        f"takes while it waits for the next is not counted{taken}"
     )
 
 
