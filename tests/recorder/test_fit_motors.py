@@ -22,6 +22,7 @@ from ir_recorder.fit import (
     recommendation,
     sentences,
     shaft_work,
+    write_fit_picture,
 )
 from ir_recorder.fit.fit_data import DataSource, fit_data, without_turns
 from ir_recorder.measure import PowerModel, Samples, samples_of
@@ -157,6 +158,17 @@ def test_gains_are_no_surer_than_the_rotor_of_each_axis() -> None:
             inside += (off < 1.645).tolist()
             assert any("an ampere of the motors is" in each for each in sentences(found))
     assert np.mean(inside) > 0.85  # of 72: 90 % less a deviation and a half
+
+
+def test_a_picture_of_a_fit_without_a_meter_shows_its_parameters(tmp_path: Path) -> None:
+    robot = load_robot("kr6_r900_2")
+    model, prior = model_of(robot)
+    estimate = Estimate(
+        [told(moved(robot, 1), model, truth_of(prior, 4))], ["a"], model, prior, motors=True
+    )
+    found = estimate.result("x")
+    path = write_fit_picture(found, estimate.prior, tmp_path / "fit.png")
+    assert path.read_bytes().startswith(b"\x89PNG")
 
 
 def test_every_recording_is_left_out_once_and_the_fit_is_recommended_where_it_is_better() -> None:

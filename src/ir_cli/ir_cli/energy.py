@@ -302,7 +302,7 @@ def run_fit(arguments: argparse.Namespace) -> int:
     arguments.output.parent.mkdir(parents=True, exist_ok=True)
     written = [write_output(arguments.output, page.encode(), PARAMETERS_START, ANYWHERE)]
     if arguments.picture:
-        written.append(write_fit_picture(found, prior, arguments.picture))
+        written.append(write_fit_picture(found, estimate.prior, arguments.picture))
     doubted = doubts(estimate, found)
     begun = "the data sheet" if prior.name == DATA_SHEET else prior.name
     advised = recommendation(unseen, doubted=bool(doubted.sentences), begun=begun)
@@ -313,7 +313,7 @@ def run_fit(arguments: argparse.Namespace) -> int:
         *doubted.sentences,
         advised,
     )
-    rows = parameter_rows(found, prior)
+    rows = parameter_rows(found, estimate.prior)
     if arguments.json:
         listed = [asdict(each) for each in found.movements]
         print_json(

@@ -151,18 +151,24 @@ _AFTER = "#5b8def"
 
 def write_fit_picture(found: Fit, prior: PowerParameters, path: Path) -> Path:
     """Write the picture as PNG and return its absolute path; RecorderError where matplotlib isn't
-    installed.
+    installed. prior: as the fit took it (`Estimate.prior`); without a meter its parameters alone
+    are shown.
     """
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
         raise RecorderError("a picture needs matplotlib: pip install matplotlib") from error
-    figure = Figure(figsize=(10.0, 9.5), dpi=110, layout="constrained", facecolor="white")
-    powers, residuals, parameters = figure.subplots(3, 1, height_ratios=(1.0, 0.8, 1.2))
-    _powers(powers, found)
-    _residuals(residuals, found)
+    metered = bool(len(found.measured))
+    size = (10.0, 9.5 if metered else 4.5)
+    figure = Figure(figsize=size, dpi=110, layout="constrained", facecolor="white")
+    if metered:
+        powers, residuals, parameters = figure.subplots(3, 1, height_ratios=(1.0, 0.8, 1.2))
+        _powers(powers, found)
+        _residuals(residuals, found)
+    else:
+        parameters = figure.subplots()
     _parameters(parameters, found, prior)
-    for axes in (powers, residuals, parameters):
+    for axes in figure.axes:
         axes.grid(color="#dde3ea", linewidth=0.6)
         axes.set_axisbelow(True)
         for side in ("top", "right"):
