@@ -151,20 +151,37 @@ def recorded(robot: Stranger, seconds: float, seed: int) -> Samples:
 def logged(robot: Stranger, seconds: float, seed: int) -> tuple[Trace, Trace]:
     """The log of the controller, and that of a meter beside it on the same clock."""
     rng = np.random.default_rng(seed)
-    time, q, qd, qdd = _motion(robot.known, seconds, rng)
-    watts = _watts(robot, time, qd, _torques(robot, time, q, qd, qdd))
+    time, q, qd, qdd = motion(robot.known, seconds, rng)
+    watts = watts_of(robot, time, qd, torques(robot, time, q, qd, qdd))
+    return joint_log(robot, time, q, rng), meter_log(watts, rng)
+
+
+def joint_log(
+    robot: Stranger,
+    time: FloatArray,
+    q: FloatArray,
+    rng: np.random.Generator,
+    torque: FloatArray | None = None,
+) -> Trace:
+    """What the controller writes of positions (N, n), and of torques of its motors (N, n)."""
     names = robot.known.joint_names
     seen = (q + rng.normal(0.0, 2e-5, q.shape))[::LOGGED]
-    joints = Trace("log", time[::LOGGED], {name: seen[:, k].copy() for k, name in enumerate(names)})
+    columns = {name: seen[:, k].copy() for k, name in enumerate(names)}
+    if torque is not None:
+        columns |= {f"{name}_effort": torque[::LOGGED, k].copy() for k, name in enumerate(names)}
+    return Trace("log", time[::LOGGED], columns)
+
+
+def meter_log(watts: FloatArray, rng: np.random.Generator) -> Trace:
+    """What a meter reads of watts (N,)."""
     count = len(watts) // READING
     mean = watts[: count * READING].reshape(count, READING).mean(axis=1)
     mean = mean * (1.0 + rng.normal(0.0, 0.005, count)) + rng.normal(0.0, 2.0, count)
-    at = DT * READING * np.arange(1, count + 1)
-    return joints, Trace("meter", at, {"power": mean})
+    return Trace("meter", DT * READING * np.arange(1, count + 1), {"power": mean})
 
 
-def _motion(
-    robot: RobotModel, seconds: float, rng: np.random.Generator
+def motion(
+    robot: RobotModel, seconds: float, rng: np.random.Generator, rest: float = _REST
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Single axes and all together, fast and slow, with pauses: time (N,), and motion (N, n)."""
     time = np.arange(0.0, seconds, DT)
@@ -172,7 +189,7 @@ def _motion(
     q = np.tile(here, (len(time), 1))
     qd = np.zeros_like(q)
     qdd = np.zeros_like(q)
-    now = _REST
+    now = rest
     number = 0
     while True:
         travel = rng.uniform(-0.8, 0.8, robot.n)
@@ -183,7 +200,7 @@ def _motion(
         way = goal - here
         fastest = float((np.abs(way) / robot.velocity_max).max()) * 1.9
         lasts = max(fastest / rng.choice([1.0, 0.6, 0.25]), 0.4)
-        if now + lasts > seconds - _REST:
+        if now + lasts > seconds - rest:
             return time, q, qd, qdd
         rows = (time >= now) & (time < now + lasts)
         x = ((time[rows] - now) / lasts)[:, None]
@@ -196,7 +213,7 @@ def _motion(
         number += 1
 
 
-def _torques(
+def torques(
     robot: Stranger, time: FloatArray, q: FloatArray, qd: FloatArray, qdd: FloatArray
 ) -> FloatArray:
     """Nm of the motors at the joints (N, n)."""
@@ -230,7 +247,7 @@ def _torques(
     return np.asarray(bodies + rotors + dry + robot.viscous * cold[:, None] * qd)
 
 
-def _watts(robot: Stranger, time: FloatArray, qd: FloatArray, torque: FloatArray) -> FloatArray:
+def watts_of(robot: Stranger, time: FloatArray, qd: FloatArray, torque: FloatArray) -> FloatArray:
     """W at the mains (N,): the axes share a link whose chopper has a hysteresis."""
     motor = torque / robot.known.gear_ratio
     axes = torque * qd + robot.copper * motor**2 + robot.switching * np.abs(motor)

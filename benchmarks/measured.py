@@ -6,7 +6,8 @@ DIR holds public recordings that a user has fetched (docs/energy.md names them; 
 repository). What is not there is left out, and said. Simulated plants as in `truth.py --only fit`
 follow (not with DIR and --quick, none with --seeds 0), then robots that nobody has a file of
 (`_measured_strangers`), by a meter of ten readings a second, how often intervals hold over
-everything together, and what comes of recordings that are spoilt (`_measured_spoilt`).
+everything together, and what comes of recordings that are spoilt (`_measured_spoilt`) or in which
+something changes half-way (`_measured_phases`).
 --page writes the table of the recordings into the page's chapter "Measured".
 """
 
@@ -20,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from _measured_phases import CLEAN, outcomes
 from _measured_robots import kr300_r2500, tx40, ur3e
 from _measured_spoilt import AS_IT_IS, OUTCOMES, ROBOTS, verdicts
 from _measured_strangers import recorded, stranger
@@ -73,6 +75,8 @@ TX40_THINNED = 10  # rows averaged to one: 2 ms
 PAYLOAD = 150.0  # kg: of the KR 300's recordings, not stated there
 OPEN = 0.3  # deviation of a payload that nobody stated
 STRANGERS = 6
+PHASES = 6  # recordings of each robot and kind
+QUICK = ("kr6_r900_2",)
 NEAR = 0.2  # of the usual deviation from what is known: a good data sheet
 DRAWS = 200
 TWICE = ("TX40, without", "KR 300, payload fitted")  # data sets that stand there already
@@ -140,6 +144,9 @@ def main() -> None:
         held += sum(others)
         count += len(others)
         own, found = _matrix(quick=asked.quick)
+        rows += own
+        claims += found
+        own, found = _phases(quick=asked.quick)
         rows += own
         claims += found
     if count:
@@ -281,6 +288,20 @@ def _inside(model: PowerModel, parameters: PowerParameters, samples: Samples) ->
         low, high = interval_over(nominal, drawn[:, begin:behind].sum(axis=1) - nominal)
         held.append(bool(low <= samples.watts[begin:behind].sum() <= high))
     return held
+
+
+def _phases(*, quick: bool) -> tuple[list[dict[str, Any]], list[Claim]]:
+    """What is said of recordings in which something changes half-way, and of others; quick: of one
+    robot, once.
+    """
+    rows = list(outcomes(range(1), QUICK) if quick else outcomes(range(PHASES)))
+    clean = [row["outcome"] == "silent" for row in rows if row["changed"] == CLEAN]
+    others = [row["outcome"] for row in rows if row["changed"] != CLEAN]
+    rightly = sum(each == "named rightly" for each in others)
+    return rows, [
+        at_most("changes named without need", clean.count(False) / len(clean), "share", 0.05),
+        at_least("changes named rightly", rightly / len(others), "share", 0.6),
+    ]
 
 
 def _matrix(*, quick: bool) -> tuple[list[dict[str, Any]], list[Claim]]:

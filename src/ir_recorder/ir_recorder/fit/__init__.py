@@ -1,5 +1,6 @@
 """Power parameters fitted to a meter or to the motors, and what the data say of each."""
 
+from ir_recorder.fit.changes import Change, change
 from ir_recorder.fit.channels import open_prior
 from ir_recorder.fit.doubts import doubts, fit_sources, result
 from ir_recorder.fit.fit_data import BY, DataSource, FitData, fit_data, source_cell
@@ -17,12 +18,14 @@ from ir_recorder.fit.presentation import left_out_rows, parameter_rows, sentence
 
 __all__ = [
     "BY",
+    "Change",
     "DataSource",
     "Estimate",
     "Fit",
     "FitData",
     "FittedMovement",
     "LeftOut",
+    "change",
     "doubts",
     "fit",
     "fit_data",

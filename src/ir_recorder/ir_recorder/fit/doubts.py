@@ -1,5 +1,5 @@
 """What speaks against a fit: power that it leaves open, a clock that runs late, columns that were
-taken for each other. Such data fit badly, but fit; so it is said.
+taken for each other, something that changed half-way. Such data fit badly, but fit; so it is said.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from ir_description import PowerParameters
 from ir_description.robot import AXIS_UNITS, CENTRES, parameter_unit
 from ir_recorder.errors import RecorderError
+from ir_recorder.fit.changes import change
 from ir_recorder.fit.channels import MOVED, FittedRun, by_window
 from ir_recorder.fit.fit_data import DataSource, FitData, fit_data
 from ir_recorder.fit.power_estimate import Estimate, Fit
@@ -107,6 +108,9 @@ def doubts(estimate: Estimate, found: Fit | None = None) -> Doubts:
             said += _of_power(estimate, run, *both)
     if estimate.motors is not None:
         said += _of_torques(estimate)
+    moved = change(estimate)
+    if moved is not None:
+        said.append(moved.sentence)
     return Doubts(tuple(said), open_ones)
 
 
