@@ -1,11 +1,11 @@
 """The schedule of least energy of a cell, with a proven gap.
 
 Rounds of the whole model: solve, hold what was decided, take the durations of least energy, add
-tangents there, and again until the bound meets the energy. Cells of many robots first get a
-schedule robot by robot, two at a time decided while the others are relaxed, or the first that the
-whole model gives. Some robots decided and all others relaxed bound the energy from below, sooner
-than the whole does. Then part of the schedule is decided anew while the rest is held: one robot,
-the places of all, or their orders, as long as that gains.
+tangents there, and again until the bound meets the energy. Cells of many robots that this doesn't
+solve at once first get a schedule robot by robot, two at a time decided while the others are
+relaxed, or the first that the whole model gives. Some robots decided and all others relaxed bound
+the energy from below, sooner than the whole does. Then part of the schedule is decided anew while
+the rest is held: one robot, the places of all, or their orders, as long as that gains.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ _CLOSE = 2e-9  # of the energy: what a tangent may miss a curve by
 _COARSE = 2e-6  # the same before anything is decided
 _PART_GAP = 2e-3  # of a part of the cell
 _PART_SHARE = 0.04  # of the seconds, for one part
+_EASY_SHARE = 0.02  # for a cell that needs no parts
 _FIRST_SHARE = 0.25  # for a first schedule of the whole
 _BOUND_SHARE = 0.4  # for the bound of some robots
 _ANEW_SHARE = 0.1  # for a part that is decided anew
@@ -126,10 +127,12 @@ class _Search:
         """Everything, in turn."""
         self._root()
         if self._bound < np.inf and len(self._instance.robots) >= _MANY:
-            self._part_by_part()
+            is_easy = self._whole(self._seconds * _EASY_SHARE)
+            if not (is_easy or self._done):
+                self._part_by_part()
         rounds = 0
         while self._left > 0.0 and not self._done and rounds < _MOST_ROUNDS:
-            self._whole()
+            self._whole(self._left)
             rounds += 1
         spent = time.process_time() - self._begun
         return CellAnswer(self._instance, self._best, self._bound, spent, self._first)
@@ -150,14 +153,15 @@ class _Search:
             ):
                 return
 
-    def _whole(self) -> None:
-        """One round of the whole model."""
+    def _whole(self, seconds: float) -> bool:
+        """One round of the whole model; whether it came to its end."""
         answer = self._model.program.solve(
-            start=self._point, stopped=after(self._left), gap=min(self._gap, PROVED) / 10.0
+            start=self._point, stopped=after(seconds), gap=min(self._gap, PROVED) / 10.0
         )
         self._bound = max(self._bound, answer.bound)
         if answer.values is not None:
             self._hold(answer.values)
+        return answer.finished
 
     def _hold(self, values: FloatArray) -> bool:
         """Durations of least energy for what a point decides; whether there are any."""
@@ -185,7 +189,8 @@ class _Search:
 
     def _part_by_part(self) -> None:
         """A schedule, and parts of it decided anew as long as that gains."""
-        if not (self._relax_and_fix(2) or self._first_of_all() or self._relax_and_fix(3)):
+        found = self._best is not None
+        if not (found or self._relax_and_fix(2) or self._first_of_all() or self._relax_and_fix(3)):
             return
         if not self._done:
             self._bound_by_robots()
