@@ -339,3 +339,28 @@ def test_a_goal_opens_the_brakes_and_waits_for_them(make, plan, start, run_out, 
     start(simulation, plan(2.0, home, there))
     assert run_out(simulation).code == ErrorCode.SUCCESSFUL
     assert simulation.time == pytest.approx(1.0 + 0.7 + 2.0, abs=0.01)
+
+
+def test_a_goal_that_is_canceled_before_it_moves_says_so(make, plan, start, run_out, home, there):
+    simulation = make()
+    goal_id = start(simulation, plan(2.0, home, there))
+    simulation.cancel(goal_id)
+    outcome = run_out(simulation)
+    assert outcome.canceled
+    assert outcome.sentence == "canceled; it had not begun to move"
+    assert np.abs(simulation.backend.q - home).max() < EXACT
+
+
+def test_an_error_beyond_a_tiny_tolerance_is_told_with_digits_that_show_it(
+    make, plan, start, run_out
+):
+    simulation = make("pybullet")
+    home = simulation.executor.command
+    start(
+        simulation,
+        plan(1.0, home, home + 0.3 * np.eye(6)[0]),
+        path_tolerance=(JointTolerance("joint_a1", 1e-9),),
+    )
+    sentence = run_out(simulation).sentence
+    error = float(sentence.split("error is ")[1].split(" ")[0])
+    assert abs(error) > 1e-9

@@ -331,9 +331,12 @@ class Executor:
         """Stop along the path; the goal ends so when the robot stands. A stop that has begun
         stays.
         """
-        if self._run is not None and not self._run.stopping:
+        run = self._run
+        if run is not None and not run.stopping:
+            if run.s == 0.0 and self._speed.value == 0.0:
+                sentence = f"{sentence.removesuffix(ON_THE_PATH)}; it had not begun to move"
             self._will_end(code, sentence, canceled)
-            self._run.stopping = True
+            run.stopping = True
 
     def drop(self, sentence: str, code: ErrorCode = ErrorCode.INVALID_GOAL) -> None:
         """End the goal at once: nobody follows the command any more. One that was stopping has not

@@ -168,7 +168,7 @@ def _worst(names: Sequence[str], error: FloatArray, bound: FloatArray, what: str
     j = int((size - bound).argmax())
     unit = joint_unit(names[j], unit)
     return (
-        f"{names[j]} {what} error is {error[j]:+.6f} {unit}: the tolerance is {bound[j]:g} {unit}"
+        f"{names[j]} {what} error is {error[j]:+.6g} {unit}: the tolerance is {bound[j]:g} {unit}"
     )
 
 
