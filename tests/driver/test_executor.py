@@ -4,6 +4,7 @@ limits.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -11,10 +12,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ir_kernels.chain import Chain
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_sim_driver.controller.outputs import report
+from ir_sim_driver.controller.settings import ControllerSettings
 from ir_sim_driver.controller.simulation import make_simulation
+from ir_sim_driver.errors import TrajectoryRefusedError
 from ir_sim_driver.motion.goal import ErrorCode, ExecutionSettings, JointTolerance
 from ir_sim_driver.notices import Level
 
@@ -364,3 +368,32 @@ def test_an_error_beyond_a_tiny_tolerance_is_told_with_digits_that_show_it(
     sentence = run_out(simulation).sentence
     error = float(sentence.split("error is ")[1].split(" ")[0])
     assert abs(error) > 1e-9
+
+
+@settings(max_examples=8, deadline=None)
+@given(at=st.floats(0.3, 2.0), duration=st.floats(0.9, 1.6), turn=st.floats(-0.6, 0.6))
+def test_in_t1_no_replacement_takes_the_tool_past_250_mm_per_s(
+    make, plan, start, cell, at, duration, turn
+):
+    home = np.array(cell.machine_home)
+    simulation = make(controller=ControllerSettings(operating_mode="T1", enabling_switch=True))
+    start(simulation, plan(3.0, home, home + 0.6 * np.eye(6)[0]))
+    before = positions(simulation, at)
+    with suppress(TrajectoryRefusedError):
+        start(simulation, plan([duration], home + turn * np.eye(6)[0]), allow_collision=True)
+    q = np.vstack((before, positions(simulation, 2.0)))
+    tcp = Chain(cell.robot, cell.base_pose, cell.tcp).tcp_poses(q)[:, :3, 3]
+    assert (np.linalg.norm(np.diff(tcp, axis=0), axis=1) / DT).max() <= 0.25
+
+
+def test_in_t1_a_replacement_that_would_be_too_fast_is_refused_and_the_first_goes_on(
+    make, plan, start, run_out, home
+):
+    simulation = make(controller=ControllerSettings(operating_mode="T1", enabling_switch=True))
+    there = home + 0.6 * np.eye(6)[0]
+    first = start(simulation, plan(3.0, home, there))
+    simulation.run(1.0)
+    with pytest.raises(TrajectoryRefusedError, match=r"would pass 250 mm/s \(T1\)"):
+        start(simulation, plan([1.0], there))
+    outcome = run_out(simulation)
+    assert (outcome.goal_id, outcome.code) == (first, ErrorCode.SUCCESSFUL)

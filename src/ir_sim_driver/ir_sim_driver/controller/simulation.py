@@ -32,10 +32,12 @@ from ir_sim_driver.errors import (
 )
 from ir_sim_driver.load_check import LoadChecks
 from ir_sim_driver.motion import (
+    TOOL_SPEED,
     ErrorCode,
     ExecutionSettings,
     Executor,
     GoalOutcome,
+    Path,
     ToolPoint,
     TrajectoryGoal,
     manual_scaling,
@@ -111,6 +113,9 @@ class Outcomes:
 # Speed scaling: the factor that was asked for, move_enable, and the tool's speed in T1.
 
 
+_KEPT = 0.98  # of the path speed: what T1 keeps of the tool's speed in hand covers the rest
+
+
 class SpeedScaling:
     """Of what `executor` follows. factor: what was asked for, in [0, 1]."""
 
@@ -136,6 +141,21 @@ class SpeedScaling:
         if not self._plc.levels.move_enable:
             return "the PLC's move_enable is 0"
         return "" if self.factor > 0.0 else "the speed scaling is 0"
+
+    def check_change(self, path: Path, joined: bool) -> None:
+        """Raise TrajectoryRefusedError where a moving robot can't go over to a path in T1: the tool
+        would be too fast before the robot has slowed down. joined: at the present path speed.
+        """
+        if self._plc.operating_mode is not OperatingMode.T1:
+            return
+        speed = self._executor.path_speed if joined else 1.0
+        allowed = manual_scaling(self._tool, path, 0.0, self._executor.stop_time)
+        if allowed < _KEPT * speed:
+            raise TrajectoryRefusedError(
+                ErrorCode.INVALID_GOAL,
+                f"the robot moves, and on its way over to the trajectory the tool would pass "
+                f"{TOOL_SPEED * 1e3:g} mm/s (T1): send it when the robot stands, or slower",
+            )
 
     def now(self) -> float:
         """The factor that counts now."""
@@ -271,6 +291,8 @@ class Simulation:
         driven = self.executor.driven
         route = vetted.route(now, self.robot, self.dynamics, self.settings.execution, delay, driven)
         moves = route.joined or bool(now.qd.any())
+        if moves:
+            self.speed_scaling.check_change(route.path, route.joined)
         wait = 0.0 if moves else max(0.0, delay - route.offset)
         goal_id = self._outcomes.next_id()
         self.executor.start(goal_id, goal, route, wait)

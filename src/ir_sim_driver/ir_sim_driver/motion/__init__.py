@@ -9,7 +9,7 @@ from ir_sim_driver.motion.goal import (
     TrajectoryGoal,
 )
 from ir_sim_driver.motion.path import Path, PathMotion
-from ir_sim_driver.motion.tool_point import ToolPoint, manual_scaling
+from ir_sim_driver.motion.tool_point import TOOL_SPEED, ToolPoint, manual_scaling
 from ir_sim_driver.motion.trajectory_checks import (
     CurrentPath,
     LeadPath,
@@ -19,6 +19,7 @@ from ir_sim_driver.motion.trajectory_checks import (
 )
 
 __all__ = [
+    "TOOL_SPEED",
     "CurrentPath",
     "ErrorCode",
     "ExecutionSettings",
