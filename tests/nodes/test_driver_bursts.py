@@ -271,7 +271,7 @@ def test_a_goal_that_is_cancelled_before_it_begins_is_cancelled() -> None:
         future=lambda: asyncio.Future(loop=loop), every=lambda seconds, call: lambda: None
     )
     loop = asyncio.new_event_loop()
-    goals = Executions(cast(Any, driver), cast(Any, node), ExecuteTrajectory, "execute", 0.0)
+    goals = Executions(cast(Any, driver), cast(Any, node), ExecuteTrajectory, 0.0)
     handle = SimpleNamespace(
         goal_id=SimpleNamespace(uuid=range(16)), request=ExecuteTrajectory.Goal()
     )
