@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from html import unescape
 from pathlib import Path
 
 import numpy as np
@@ -247,14 +248,19 @@ def test_without_a_program_there_is_nothing_to_pay(analysis: Analysis) -> None:
 
 
 @pytest.mark.parametrize(
-    ("saved", "words"),
-    [(30.0, "0.5"), (60.0, "1"), (1000.0, "17"), (12.0, "0.2")],
+    ("saved", "words", "months"),
+    [
+        (30.0, "0.5 h", "24"),
+        (60.0, "1 h", "12"),
+        (1000.0, "17 h", "0.72"),
+        (12.0, "0.2 h", "60"),
+    ],
 )
-def test_a_saving_pays_for_hours_of_an_engineer(saved: float, words: str) -> None:
+def test_a_saving_pays_for_hours_of_an_engineer(saved: float, words: str, months: str) -> None:
     costs = Costs(engineer_hour=60.0)
     year = Amount(1.0, 0.5, 1.5).times(saved)
     assert payback(year, costs) == (
-        f"worth it within a year where it takes less than {words} h of an engineer (60 EUR/h)"
+        f"pays for {words} of an engineer a year (60 EUR/h), for one hour in {months} months"
     )
     assert payback(replace(year, low=-year.low), costs) == ""
 
@@ -340,9 +346,9 @@ def test_a_fleet_counts_the_same_robots_in_shifts_and_at_night(
     assert "second alike in all: no file says what its plan saves" in picture
     driven = picture.partition("today: as driven")[2]
     assert f"{yearly_money(nights, 'EUR')} outside" in driven  # nobody recorded a night
-    assert "of the saving is of nights, by the data sheet" in page
+    assert "of the saving is at night, from the data sheet" in page
     assert "Simulated, not measured" in page
-    assert "The plan of first instead of its common program" in page
+    assert 'The plan of "first" instead of its common program' in unescape(page)
     assert "the 576 h a year (15 % of the shifts) in which the cell stands still" in page
     measures = page.split("<h2>What could still be saved, each by itself")[1].partition(
         "</section>"

@@ -174,6 +174,24 @@ def test_how_far_a_run_is_from_its_plan_is_one_figure(
         assert "as planned" not in answer
 
 
+def test_what_was_reached_is_what_the_plan_saves_but_for_what_is_named(analysis: Analysis) -> None:
+    """The list of what was reached added up to 106 EUR, the picture said 105 EUR."""
+    page = plain(report_html(analysis, (), costs=Costs(price=20.0)))
+    answer, _, picture = page.partition('<section id="year">')
+    listed = answer.split("Reached: keep driving it")[1].partition("Still to save")[0]
+    steps = re.findall(r": (-?[\d., ]+) EUR", listed)
+    off, side = re.findall(r"Driven ([\d. ]+) EUR a year (above|below) the plan", answer)[0]
+    common, driven = (
+        float(
+            re.findall(rf">{name}[^<]*</span>.*?<b>([\d ]+) EUR</b>", picture)[0].replace(" ", "")
+        )
+        for name in ("common program", "as driven")
+    )
+    planned = sum(float(each.replace(" ", "")) for each in steps)
+    named = float(off.replace(" ", "")) * (-1.0 if side == "above" else 1.0)
+    assert common - driven == pytest.approx(planned + named, abs=2.5)  # each is rounded by itself
+
+
 def test_what_a_robot_takes_until_its_next_cycle_is_named(analysis: Analysis) -> None:
     """A year counts the cycles of the common program, and nothing of the wait for the next one."""
     found = analysis.savings

@@ -34,6 +34,7 @@ from ir_recorder.report.money_text import (
     Repriced,
     hours_of,
     money,
+    months_of,
     price_of,
     yearly_money,
     yearly_span,
@@ -512,14 +513,15 @@ def money_of_thousand(energy: float, costs: Costs) -> str:
 
 
 def payback(money: Amount, costs: Costs) -> str:
-    """How many hours of an engineer a saving of a year pays for; "" where it is open whether
-    anything is saved, or next to nothing is.
+    """How many hours of an engineer a saving of a year pays for, and after how long one is paid;
+    "" where it is open whether anything is saved, or next to nothing is.
     """
     if money.doubt or money.value < NOTHING or costs.engineer_hour <= 0.0:
         return ""
     hours = hours_of(money.value, costs.engineer_hour, costs.currency)
     hour = f"{costs.engineer_hour:g} {costs.currency}/h"
-    return f"worth it within a year where it takes less than {hours} h of an engineer ({hour})"
+    months = months_of(money.value, costs.engineer_hour, costs.currency)
+    return f"pays for {hours} h of an engineer a year ({hour}), for one hour in {months} months"
 
 
 def share_between(amount: Amount, of: float) -> str:

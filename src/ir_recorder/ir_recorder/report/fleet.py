@@ -76,7 +76,6 @@ from ir_recorder.report.paid import (
     at_night,
     between_of,
     counted_at,
-    percent_of,
     reached_saving,
     row_of,
     with_span,
@@ -463,7 +462,7 @@ def fleet_html(
     known = at_mains(members)
     summed = [robot for robot in robots if not robot.drives_only]
     paid = _paid(known, prices)
-    basis = _computed(known)
+    basis = _basis(known, summed)
     sections = [
         _section("Robots, those that cost most first", _robots(members, robots, prices), "robots"),
         _section(
@@ -526,8 +525,7 @@ def _answer(paid: Paid, robots: Sequence[Robot], costs: Costs) -> Answer:
             counted=counted_at(costs),
         )
     year = paid.year(costs)
-    word, gain = year.money.gain()
-    less = "less" if word == "saved" else "more"
+    less = "less" if year.money.gain()[0] == "saved" else "more"
     than = paid.before if paid.saved is not None else "closed brakes at night"
     result = f"{paid.gain_words(costs)} a year {less} than {than}"
     if paid.saved is not None and paid.saved.doubt:
@@ -536,12 +534,9 @@ def _answer(paid: Paid, robots: Sequence[Robot], costs: Costs) -> Answer:
     if reached is not None:
         result = paid.reached_words(costs)
     saved = year.with_energy(costs)
-    before = paid.before_amounts(costs)
-    whole = yearly_money(sum(before), costs.currency)
-    share = f"{percent_of(gain.value, sum(before))} of the {whole} of {paid.before}"
     parts = [
         f"{counted(len(summed), 'robot')}{' together' if len(summed) > 1 else ''}",
-        share if paid.saved is not None and sum(before) > 0.0 else "",
+        paid.share_words(costs) if paid.saved is not None and paid.common > 0.0 else "",
         f"{saved} {less}" if saved else "",
         payback(year.money, costs),
     ]
@@ -550,10 +545,10 @@ def _answer(paid: Paid, robots: Sequence[Robot], costs: Costs) -> Answer:
     return Answer(
         result,
         f"{words}.",
-        paid.sure(costs),
+        paid.sure(costs, _above(robots, costs)),
         todo or ["Keep the programs as they are."],
         a_night(paid.idle, costs),
-        f"{'' if reached is None else 'together '}{between_of(gain, costs)}",
+        paid.between_words(costs),
         done,
         counted_at(costs),
     )
@@ -584,11 +579,16 @@ def _steps(paid: Paid, robots: Sequence[Robot], costs: Costs) -> tuple[list[str]
             done.append(words)
         else:
             found.append((saved.value, words))
-    above = costs.money(sum(robot.above for robot in robots if not robot.drives_only))
+    above = _above(robots, costs)
     if done and above >= ABOVE_LEAST * costs.money(paid.common):
         words = f"{ABOVE[0].upper()}{ABOVE[1:]}: {yearly_money(above, costs.currency)} a year."
         found.append((above, words))
     return [words for _, words in sorted(found, reverse=True)], done
+
+
+def _above(robots: Sequence[Robot], costs: Costs) -> float:
+    """Money of a year that runs took more than their plans."""
+    return costs.money(sum(robot.above for robot in robots if not robot.drives_only))
 
 
 def _plans(robots: Sequence[Robot]) -> str:
@@ -600,9 +600,9 @@ def _plans(robots: Sequence[Robot]) -> str:
     gains = {robot: saved.value for robot, saved in savings.items() if saved is not None}
     saving = sorted((robot for robot in gains if gains[robot] > 0.0), key=lambda r: -gains[r])
     if len(saving) == 1:
-        of = f"the plan of {saving[0].name} instead of its common program"
+        of = f'the plan of "{saving[0].name}" instead of its common program'
     else:
-        of = f"the plans, that of {saving[0].name} first, instead of common programs"
+        of = f'the plans, that of "{saving[0].name}" first, instead of common programs'
     driven = all(robot.driven for robot in saving)
     return f"{of[0].upper()}{of[1:]}" if driven else f"Drive {of}"
 
@@ -626,7 +626,7 @@ def _badge(paid: Paid, costs: Costs) -> str:
         nights = paid.idle.saved / (paid.idle.saved + costs.money(paid.saved.value))
         if nights > _MUCH:
             return badge(
-                f"{100.0 * nights:.0f} % of the saving is of nights, by the data sheet", "open"
+                f"{100.0 * nights:.0f} % of the saving is at night, from the data sheet", "open"
             )
     return badge("The plans save", "good")
 
@@ -656,11 +656,16 @@ def _tiles(
         watts(peak),
         (
             "in shifts, as if all robots' largest came at once",
+            UNDRIVEN if any(_stands(robot) for robot in summed) else "",
             _outside(paid.idle),
             demand_note(peak, costs),
         ),
     )
     return [costs_tile, demand]
+
+
+UNDRIVEN = "plans that nobody drove: as planned"
+"""Of figures that have no common program's beside them."""
 
 
 def _outside(idle: IdleSaving | None) -> str:
@@ -999,6 +1004,15 @@ def _saved(amount: Amount | None, costs: Costs) -> str:
     price = yearly_money(costs.money(amount.value), costs.currency)
     energy = f"{kilowatt_hours(amount.value)}{' more' if word == 'more' else ''}"
     return f"<b>{text(price)}</b><small>{text(energy)}</small>{between}"
+
+
+def _basis(members: Sequence[Member], robots: Sequence[Robot]) -> str:
+    """What energies by mode and by movement are of, in sentences; "" where all was driven."""
+    computed = _computed(members)
+    if not any(_stands(robot) for robot in robots):
+        return computed
+    planned = f"{UNDRIVEN[0].upper()}{UNDRIVEN[1:]}, not the {COMMON}."
+    return f"{computed} {planned}".strip()
 
 
 def _matrix(

@@ -113,6 +113,11 @@ def hours_of(value: float, hour: float, currency: str) -> str:
     return _carried("h", (value / hour,), significant(value / hour, 2), currency)
 
 
+def months_of(value: float, hour: float, currency: str) -> str:
+    """After how many months of a year's saving an hour at a price of its own is paid."""
+    return _carried("t", (value / hour,), significant(12.0 * hour / value, 2), currency)
+
+
 def price_of(value: float, currency: str) -> str:
     """The price of a kilowatt-hour, with its currency."""
     return _carried("p", (value,), f"{value:g} {currency}/kWh", currency)

@@ -93,14 +93,9 @@ class Paid:
         [J]: what a part took and takes then.
         """
         year = self.year(costs)
-        word, gain = year.money.gain()
-        less = "less" if word == "saved" else "more"
-        before = self.before_amounts(costs)
+        less = "less" if year.money.gain()[0] == "saved" else "more"
         energy = year.with_energy(costs)
-        share = (
-            f"{percent_of(gain.value, sum(before))} of the "
-            f"{yearly_money(sum(before), costs.currency)} of the {self.before}"
-        )
+        share = self.share_words(costs)
         said = (share, f"{energy} {less}" if energy else "", payback(year.money, costs), self.more)
         result = f"{self.gain_words(costs)} {less} a year"
         if self.saved is not None and self.saved.doubt:
@@ -113,11 +108,11 @@ class Paid:
         nights = first_steps(self._above_steps(costs), self.idle, costs)
         return Answer(
             result,
-            f"{words}.",
-            self.sure(costs),
+            f"{words[0].upper()}{words[1:]}.",
+            self.sure(costs, self._above(costs)),
             nights if reached is not None else first_steps(steps, self.idle, costs) or KEEP,
             [*_of_parts(part, costs), *a_night(self.idle, costs)],
-            f"{'' if reached is None else 'together '}{between_of(gain, costs)}",
+            self.between_words(costs),
             own if reached is not None else (),
             counted_at(costs),
         )
@@ -130,12 +125,37 @@ class Paid:
 
     def _above_steps(self, costs: Costs) -> list[Step]:
         """What a run took above its plan, as something to do; none where that is little."""
+        above = self._above(costs)
+        if above <= 0.0 or above < ABOVE_LEAST * costs.money(self.common):
+            return []
+        return [(Amount.of_value(above), ABOVE)]
+
+    def _above(self, costs: Costs) -> float:
+        """Money of a year that a run took more than its plan; 0 where nothing was driven."""
         if self.driven is None or self.saved is None:
-            return []
-        above = self.driven[1] - (self.common - self.saved.value)
-        if above < ABOVE_LEAST * self.common:
-            return []
-        return [(Amount.of_value(costs.money(above)), ABOVE)]
+            return 0.0
+        return costs.money(self.driven[1] - (self.common - self.saved.value))
+
+    def share_words(self, costs: Costs) -> str:
+        """A year of the plan and of what it is held against: "235 EUR a year instead of 558 EUR
+        (common program), 57.8 % less".
+        """
+        before = sum(self.before_amounts(costs))
+        word, gain = self.year(costs).money.gain()
+        less = "less" if word == "saved" else "more"
+        then = yearly_money(sum(self._then(costs)), costs.currency)
+        all_of_it = "with all of it " if self.has_reached is not None else ""
+        return (
+            f"{all_of_it}{then} a year instead of {yearly_money(before, costs.currency)} "
+            f"({self.before}), {percent_of(gain.value, before)} {less}"
+        )
+
+    def between_words(self, costs: Costs) -> str:
+        """The interval of all that is saved; where a part of it was reached, whose it is."""
+        between = between_of(self.year(costs).money.gain()[1], costs)
+        if self.has_reached is None or not between:
+            return between
+        return f"{self.gain_words(costs)}: {between}"
 
     def gain_words(self, costs: Costs) -> str:
         """What is saved of a year in all, or taken more, in money."""
@@ -164,15 +184,18 @@ class Paid:
         nights = 0.0 if self.idle is None else self.idle.left_alone
         return costs.money(self.common), nights
 
-    def sure(self, costs: Costs) -> list[str]:
-        """How sure a saving is: what its interval is of, and what each part of it rests on."""
+    def sure(self, costs: Costs, above: float = 0.0) -> list[str]:
+        """How sure a saving is: what its interval is of, and what each part of it rests on; above:
+        money of a year that runs took more than their plans.
+        """
         said = []
         if self.saved is not None:
             limit = f"; {self.supply}" if self.supply else ""
-            spread = ", the interval is of the robot's data alone" if self._spreads(costs) else ""
+            spread = f"; {OF_DATA}" if self._spreads(costs) else ""
             said.append(f"What plans save is predicted{spread}{limit}.")
         if self.has_reached is not None:
             said.append(f"Reached: the {self.before}, predicted, less what was driven.")
+            said.append(_above_words(above, costs))
         said.append(self.run)
         if self.idle is not None:
             late = "a robot that is woken late delays the first cycle"
@@ -254,6 +277,19 @@ def planned_name(before: str) -> str:
 ON_BRAKES = "on closed brakes"
 """How a robot rests outside of the shifts where nobody puts it into another mode."""
 KEEP = "Keep the program as it is."
+
+
+OF_DATA = "its interval covers how uncertain the robot's data are, nothing else"
+"""What the interval of a predicted saving is of."""
+
+
+def _above_words(above: float, costs: Costs) -> str:
+    """Where what was driven lies off its plan, and where that is counted; "" on its plan."""
+    if abs(above) < NOTHING:
+        return ""
+    side, row = ("above", "still to save") if above > 0.0 else ("below", "reached")
+    shown = yearly_money(abs(above), costs.currency)
+    return f"Driven {shown} a year {side} the plan: counted as {row}."
 
 
 def reached_saving(saved: Amount, common: float, driven: float) -> Amount:

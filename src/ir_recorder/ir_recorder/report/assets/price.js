@@ -24,6 +24,7 @@ const Amounts = (() => {
       return `${show(low)} to ${show(high)}`.replace(/(\d) (?=\d)/g, "$1\u00a0");
     },
     h: ([value]) => significant(value, 2),
+    t: ([value]) => significant(12 / value, 2),
     p: ([value]) => String(Number(value.toPrecision(6))),
   };
   /* The text of an amount at so many times the price that it was computed with. */
