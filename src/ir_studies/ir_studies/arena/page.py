@@ -313,7 +313,7 @@ def _answer(
         f"as many its trajectories cost least: {100.0 * (best.cost_ratio - 1.0):.2f} % above the "
         f"best known in the median. {counted(len(settings.planners), 'planner')} had "
         f"{settings.seconds:g} s of processor for each of "
-        f"{counted(ranking.questions, 'movement')}."
+        f"{counted(ranking.questions, 'movement')}{_left_out(runs)}."
     )
     return Answer(
         _result(ranking),
@@ -325,6 +325,12 @@ def _answer(
             f"it is {joules(0.01 * best.energy)}."
         ],
     )
+
+
+def _left_out(runs: Sequence[ArenaRun]) -> str:
+    """How many movements count for nobody, as their straight line is free; "" without one."""
+    left = len({run.entry.question for run in blocked_and_free(runs)[1]})
+    return f"; {left} more have a free straight line and need no search" if left else ""
 
 
 def _result(ranking: _Ranking) -> str:

@@ -38,7 +38,7 @@ from ir_recorder.report.number_text import (
     text,
 )
 from ir_recorder.report.page import PAGE_START
-from ir_recorder.report.paid import Tile, between_of, counted_at, row_of
+from ir_recorder.report.paid import OF_DATA, Tile, between_of, counted_at, row_of
 from ir_recorder.report.shapes import body_mesh, capsule_mesh
 from ir_recorder.report.shell import source_badge
 from ir_recorder.report.step_table import write_columns
@@ -368,7 +368,7 @@ def _answer(
     between = between_of(year.money, costs)
     seeds = _between_seeds(one)
     sure = [
-        f"Predicted, not driven; the interval is of the robot's data alone. {_APART}",
+        f"Predicted, not driven; {OF_DATA}. {_APART}",
         f"{seeds[0].upper()}{seeds[1:]}.",
         _at_limits(one, settings).strip(),
     ]
@@ -381,7 +381,10 @@ def _answer(
     price = yearly_money(year.money.value, costs.currency)
     if year.money.value < costs.engineer_hour:
         hour = f"{costs.engineer_hour:g} {costs.currency}"
-        do = f"Leave everything where it stands: less than one hour of an engineer ({hour})."
+        do = (
+            f"Leave everything where it stands: a year saves less than an hour of an engineer "
+            f"costs ({hour})."
+        )
         result = f"Not worth moving: {price} a year"
         return Answer(result, words, sure, do, between=between, counted=rests_on)
     result = f"{price} less a year"
@@ -408,7 +411,8 @@ def _between_seeds(one: Final) -> str:
     seeds = len(one.rows)
     if seeds == 1:
         return "planned with one seed"
-    return f"{kilowatt_hours(one.spread())} a cycle between {seeds} seeds"
+    apart = f"{kilowatt_hours(one.spread())} a cycle"
+    return f"{seeds} searches from different seeds (random numbers) lie {apart} apart"
 
 
 _EDGE = 0.03  # of its range: a variable that near to an end stands at the edge of what was searched

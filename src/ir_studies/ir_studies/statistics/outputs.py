@@ -382,7 +382,9 @@ def _answer(found: Findings) -> Answer | None:
         return Answer(_timings(found), "", _SCOPE) if found.solved > found.same else None
     each = _against_direct(found)
     assert each is not None
-    sure = [f"Over {counted(each.pairs, 'pair')} of places.", _SCOPE]
+    sure = [f"{counted(found.driven, 'movement')} between {counted(each.pairs, 'pair')} of places"]
+    sure[0] += f": {BOTH_ONCE}." if found.same else "."
+    sure.append(_SCOPE)
     if found.solved < found.pairs:
         sure.append(f"{found.pairs - found.solved} of {found.pairs} pairs could not be planned.")
     between = f"90 % interval {_interval(each.mean)} %" if math.isfinite(each.mean.low) else ""
@@ -398,6 +400,10 @@ def _answer(found: Findings) -> Answer | None:
     return Answer(
         result, f"{words} {_timings(found)}.", sure, advice, _in_money(each.mean), between
     )
+
+
+BOTH_ONCE = "by both timings, once where these move alike"
+"""Which movements of a pair are driven."""
 
 
 def _in_money(off: Mean) -> list[str]:
@@ -459,14 +465,14 @@ def _predicted(found: Findings) -> tuple[str, str]:
     low = each.mean.value < 0.0
     result = f"Predicted energies are {_off(each)}"
     words = (
-        f"Their sum; {'too low' if low else 'too high'} in {each.less if low else each.more} of "
-        f"{each.count} movements."
+        f"By the sum of all movements; {'too low' if low else 'too high'} in "
+        f"{each.less if low else each.more} of {each.count} of them."
     )
     if abs(each.mean.value) < ALIKE:
         result = "Predicted energies are right"
-        words = "Their sum."
+        words = "By the sum of all movements."
     elif math.isfinite(each.mean.low) and not each.outside:
-        words = f"Their sum: {result.lower()}, which may be chance."
+        words = f"By the sum of all movements: {result.lower()}, which may be chance."
         result = "Predicted energies are not shown to be off"
     if math.isfinite(found.covered):
         inside = round(found.covered * found.driven)
@@ -497,6 +503,7 @@ def _tiles(found: Findings) -> list[Tile]:
     """
     compared = found.solved - found.same
     both = f"{found.solved} with both timings certified"
+    alike = f"{found.same} left out: both timings move alike" if found.same else ""
     tiles = []
     timing = "asynchronous against synchronous"
     for each in (*found.agreements, *found.comparisons):
@@ -506,7 +513,7 @@ def _tiles(found: Findings) -> list[Tile]:
         of = timing if each in found.comparisons else "of a movement's energy"
         verdict = "" if each.shown else "not shown once all rows count together (Holm)"
         tiles.append(Tile(each.name, f"{percent(each.mean.value)} %", (within, of, verdict)))
-    return [*tiles, Tile("pairs compared", f"{compared} of {found.pairs}", (both,))]
+    return [*tiles, Tile("pairs compared", f"{compared} of {found.pairs}", (both, alike))]
 
 
 def summed_up(found: Findings) -> str:
