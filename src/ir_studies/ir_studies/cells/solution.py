@@ -35,7 +35,7 @@ _PART_GAP = 2e-3  # of a part of the cell
 _PART_SHARE = 0.04  # of the seconds, for one part
 _EASY_SHARE = 0.02  # for a cell that needs no parts
 _FIRST_SHARE = 0.25  # for a first schedule of the whole
-_BOUND_SHARE = 0.4  # for the bound of some robots
+_BOUND_SHARE = 0.25  # for the bound of some robots
 _ANEW_SHARE = 0.1  # for a part that is decided anew
 _WHOLE_SHARE = 0.1  # is left for the bound
 
