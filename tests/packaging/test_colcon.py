@@ -93,9 +93,13 @@ def test_colcon_builds_the_python_packages(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_colcon_compiles_the_core_and_it_passes_its_tests(tmp_path: Path) -> None:
+def test_colcon_builds_the_interfaces_and_the_core_which_passes_its_tests(tmp_path: Path) -> None:
     """It is compared with the reference and with the build for this processor."""
-    prefix = build(tmp_path, "--packages-select", "ir_kernels", core="baseline")
+    prefix = build(tmp_path, "--packages-up-to", "ir_kernels", core="baseline")
+    declared = {file.name for file in (WORKSPACE / "src" / "ir_msgs").glob("*/*.msg")}
+    assert {file.name for file in (prefix / "share" / "ir_msgs" / "msg").glob("*.msg")} == declared
+    assert list((prefix / "lib").glob("python3.*/site-packages/ir_msgs/ir_msgs_s__*.so"))
+
     site = site_of(prefix)
     assert list(site.glob("ir_kernels/_baseline*.so")), "the core was not compiled"
     for built in (ROOT / "src" / "ir_kernels" / "ir_kernels").glob("_[np]*.so"):
@@ -106,11 +110,3 @@ def test_colcon_compiles_the_core_and_it_passes_its_tests(tmp_path: Path) -> Non
     tested = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True)
     assert tested.returncode == 0, tested.stdout[-4000:] + tested.stderr[-1000:]
     assert "skipped" not in tested.stdout, tested.stdout[-2000:]
-
-
-@pytest.mark.long
-def test_colcon_builds_the_interfaces(tmp_path: Path) -> None:
-    prefix = build(tmp_path, "--packages-select", "ir_msgs")
-    declared = {file.name for file in (WORKSPACE / "src" / "ir_msgs").glob("*/*.msg")}
-    assert {file.name for file in (prefix / "share" / "ir_msgs" / "msg").glob("*.msg")} == declared
-    assert list((prefix / "lib").glob("python3.*/site-packages/ir_msgs/ir_msgs_s__*.so"))

@@ -5,7 +5,7 @@ tangents there, and again until the bound meets the energy. Cells of many robots
 solve at once first get a schedule robot by robot, two at a time decided while the others are
 relaxed, or the first that the whole model gives. Some robots decided and all others relaxed bound
 the energy from below, sooner than the whole does. Then part of the schedule is decided anew while
-the rest is held: one robot, the places of all, or their orders, as long as that gains.
+the rest is held: one robot, the orders of all, or their places, as long as that gains.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ _PART_GAP = 2e-3  # of a part of the cell
 _PART_SHARE = 0.04  # of the seconds, for one part
 _EASY_SHARE = 0.02  # for a cell that needs no parts
 _FIRST_SHARE = 0.25  # for a first schedule of the whole
-_BOUND_SHARE = 0.25  # for the bound of some robots
+_BOUND_SHARE = 0.2  # for the bound of some robots
 _ANEW_SHARE = 0.1  # for a part that is decided anew
-_WHOLE_SHARE = 0.1  # is left for the bound
+_WHOLE_SHARE = 0.03  # is left for the whole
 
 
 @dataclass(frozen=True)
@@ -204,8 +204,8 @@ class _Search:
         robots = range(len(self._instance.robots))
         parts: list[Callable[[FloatArray], dict[int, float]]] = [
             *(functools.partial(model.of_others, {robot}) for robot in robots),
-            model.of_places,
             model.of_orders,
+            model.of_places,
         ]
         idle = 0
         for held in itertools.cycle(parts):
