@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from ir_description import load_cell
@@ -59,6 +59,7 @@ def phase_voltage(cell: str, torque: FloatArray, speed: FloatArray) -> FloatArra
     high=st.floats(0.94, 1.3),
     shares=st.lists(st.floats(0.0, 1.0), min_size=6, max_size=6),
 )
+@example(cell="kr6_bench", high=1.01171875, shares=[0.0, 0.0, 0.0, 0.0, 0.0, 0.83984375])
 def test_the_torque_that_is_left_needs_no_more_current_and_voltage(
     cell: str, high: float, shares: list[float]
 ) -> None:

@@ -23,7 +23,7 @@ from ir_planner.errors import RequestError
 from ir_values.arrays import FloatArray
 
 _KNOTS = 12  # of the envelope, over the speeds at which the voltage bounds
-_BETWEEN = 16  # places between two knots at which it is held against the bound
+_BETWEEN = 1000  # pieces between two knots in each of which it is held against the bound
 _GRID = 200  # speeds among which the one is sought from which on the voltage bounds
 _LEAST = 0.02  # of U that is left at full speed
 
@@ -75,12 +75,14 @@ def within_current_and_voltage(robot: RobotModel, link: LinkVoltage) -> RobotMod
     knee = np.clip(knee, full / _GRID, (1.0 - 1.0 / _GRID) * full)
     speeds = knee + np.linspace(0.0, 1.0, _KNOTS)[:, None] * (full - knee)
     allowed = ampere(speeds)
-    # between two knots the envelope is straight: lowered until it is nowhere above the bound
-    share = np.linspace(0.0, 1.0, _BETWEEN)[:, None, None]
+    # Between two knots the envelope is straight. Both it and the bound fall with the speed, so in a
+    # piece it is at most its begin and the bound at least its end: lowered by that, it is nowhere
+    # above the bound.
+    share = np.linspace(0.0, 1.0, _BETWEEN + 1)[:, None, None]
     between = speeds[:-1] + share * np.diff(speeds, axis=0)
     straight = allowed[:-1] + share * np.diff(allowed, axis=0)
     bound = ampere(between.reshape(-1, len(full))).reshape(between.shape)
-    beyond = np.max(straight / bound, axis=(0, 1))
+    beyond = np.max(straight[:-1] / bound[1:], axis=(0, 1))
     torque = allowed * torque_per_ampere / np.maximum(beyond, 1.0)
     levels = np.concatenate([torque[:1], torque]).T
     return replace(robot, envelope_speed=speeds.T, envelope_torque=levels)
