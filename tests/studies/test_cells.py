@@ -11,7 +11,15 @@ import pytest
 from _cells_drawn import drawn
 from _cells_judge import energy, faults
 
-from ir_studies.cells import CellAnswer, Instance, hurried, read_instances, solve_cell, written
+from ir_studies.cells import (
+    CellAnswer,
+    Instance,
+    hurried,
+    read_instances,
+    solution,
+    solve_cell,
+    written,
+)
 from ir_studies.cells.instance import EnergyCurve, StaticActivity, StopLocation, stay_ranges
 from ir_studies.errors import SettingsError
 
@@ -138,6 +146,36 @@ def test_hurrying_never_saves() -> None:
     for seed in range(3):
         instance = drawn(1, 4, seed)
         assert solve_cell(hurried(instance)).energy >= solve_cell(instance).energy - 1e-3
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_parts_alone_give_a_valid_schedule_and_bound_no_more_than_the_whole_proves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int
+) -> None:
+    """The whole model is never asked: a schedule robot by robot, bounds by robots, parts anew."""
+    path = file_of(tmp_path, drawn(4, 4, seed, conflicts=20))
+    (instance,) = read_instances(path)
+    whole = solve_cell(instance)
+    assert whole.gap == 0.0
+    monkeypatch.setattr(solution._Search, "_whole", lambda search, seconds: False)
+    parts = solve_cell(instance)
+    element = ET.parse(path).getroot().find("instance")
+    assert faults(element, rows_of(parts)) == []
+    assert energy(element, rows_of(parts)) == pytest.approx(parts.energy, rel=1e-9)
+    assert 0.9 * whole.energy < parts.bound <= whole.energy * (1.0 + solution.PROVED)
+    assert whole.bound * (1.0 - solution.PROVED) <= parts.energy < 1.05 * whole.energy
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_curves_that_are_not_met_in_time_give_a_valid_schedule(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int
+) -> None:
+    monkeypatch.setattr(solution, "_MOST_ROUNDS", 1)
+    path = file_of(tmp_path, drawn(2, 5, seed))
+    answer = solve_cell(read_instances(path)[0])
+    element = ET.parse(path).getroot().find("instance")
+    assert faults(element, rows_of(answer)) == []
+    assert answer.bound <= answer.energy
 
 
 def test_many_robots_get_a_schedule_with_a_stated_gap(tmp_path: Path) -> None:

@@ -166,12 +166,13 @@ class _Search:
     def _hold(self, values: FloatArray) -> bool:
         """Durations of least energy for what a point decides; whether there are any."""
         fixed = self._model.choices(values)
-        for _ in range(_MOST_ROUNDS):
+        for left in reversed(range(_MOST_ROUNDS)):
             answer = self._model.program.relaxed(fixed)
             if answer.values is None:
                 return False
             values = answer.values
-            if not self._model.refine(values, _CLOSE * abs(answer.cost)):
+            # of corners that are cut after the last round the point has no weights
+            if left == 0 or not self._model.refine(values, _CLOSE * abs(answer.cost)):
                 break
         self._keep(values)
         return True
