@@ -366,14 +366,15 @@ class Opened(Estimate):
         slopes = []
         for k, (run, (more, per, shape)) in enumerate(zip(self.runs, asked, strict=True)):
             with_more = partial(self._with_more, run.prepared, mean)
-            power, own = self.model.watts_and_slopes(mean, with_more(more), softness)
+            asked_for = with_more(more)
+            power, own = self.model.watts_and_slopes(mean, asked_for, softness)
             heavier = with_more(more + self._kg * self._units[k])
             by_mass = (self.model.watts(mean, heavier, softness) - power) / self._kg
             by_change = np.zeros(len(power))
             if kind in _TORQUES:
                 step = self._kg if kind == PAYLOAD else _SHARE
-                raised = self.model.watts(mean, with_more(more + step * per), softness)
-                by_change = (raised - power) / step
+                raised = with_more(more + step * per)
+                by_change = (self.model.watts(mean, raised, softness) - power) / step
             columns = run.samples.metered(np.column_stack([power, own, by_mass, by_change]))
             rate = -np.gradient(columns[:, 0], run.samples.step)
             if kind == CLOCK:
