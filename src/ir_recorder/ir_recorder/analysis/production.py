@@ -256,6 +256,7 @@ def _driven(analysis: Analysis, program: ProgramTotals) -> Production | None:
             sum(pause.seconds for pause in full.added) / cycles,
             sum(pause.energy for pause in full.added) / cycles,
         )
+    mean = _Mean(analysis, full, seconds, energy, cycles, _all_of(analysis))
     return Production(
         name,
         analysis.recording.origin,
@@ -264,8 +265,8 @@ def _driven(analysis: Analysis, program: ProgramTotals) -> Production | None:
         energy,
         energy,
         cycles,
-        _modes(analysis, full, seconds, energy, cycles, _all_of(analysis)),
-        _steps(analysis, full, seconds, energy, cycles, _all_of(analysis)),
+        _modes(mean),
+        _steps(mean),
         savings.of_part(cycles / programs) if savings is not None else None,
         tuple(notes),
         computed=computed,
@@ -285,7 +286,7 @@ def _tended(analysis: Analysis, tending: Tending, whole: Share, notes: Sequence[
     count = len(parts)
     seconds = sum(part.span.seconds for part in parts) / count
     energy = sum(part.joules for part in parts) / count
-    time = _counted(analysis)
+    cycle = _Mean(analysis, None, seconds, energy, count, _counted(analysis))
     filled = "with the line full" if tending.steady else "while the line was filled"
     mean = "the part" if count == 1 else f"mean of {count} parts"
     return Production(
@@ -296,8 +297,8 @@ def _tended(analysis: Analysis, tending: Tending, whole: Share, notes: Sequence[
         energy,
         energy,
         whole.seconds / seconds,
-        _modes(analysis, None, seconds, energy, count, time),
-        _steps(analysis, None, seconds, energy, count, time),
+        _modes(cycle),
+        _steps(cycle),
         _of_parts(analysis.savings, tending),
         tuple(notes),
     )
@@ -327,32 +328,39 @@ def _counted(analysis: Analysis) -> Span:
     return Span(parts[0].span.begin, parts[-1].span.end)
 
 
-def _modes(
-    analysis: Analysis,
-    full: Unshortened | None,
-    seconds: float,
-    energy: float,
-    cycles: float,
-    time: Span,
-) -> dict[str, Share]:
+@dataclass(frozen=True)
+class _Mean:
+    """A mean cycle: seconds and energy [J] of one, and how many of them a time of the recording
+    holds, with what full lengths of shortened pauses add to it.
+    """
+
+    analysis: Analysis
+    full: Unshortened | None
+    seconds: float
+    energy: float
+    cycles: float
+    time: Span
+
+
+def _modes(mean: _Mean) -> dict[str, Share]:
     """Shares of the modes in a time; readings at its ends count by their part."""
-    power = analysis.recording.power
+    power = mean.analysis.recording.power
     if power is None or len(power.time) < 2:
         return {}
     since = np.concatenate((power.time[:1], power.time[:-1]))
-    inside = np.minimum(power.time, time.end) - np.maximum(since, time.begin)
+    inside = np.minimum(power.time, mean.time.end) - np.maximum(since, mean.time.begin)
     known = (inside > 0.0) & np.isfinite(power.power)
     rows = []
     for number in np.unique(power.mode[known]).tolist():
         own = known & (power.mode == number)
         joules_of = float((power.power[own] * inside[own]).sum())
         rows.append((mode_name(int(number)), float(inside[own].sum()), joules_of))
-    if full is not None:
-        rows += [(pause.mode, pause.seconds, pause.energy) for pause in full.added]
-    found = _summed(rows, cycles)
+    if mean.full is not None:
+        rows += [(pause.mode, pause.seconds, pause.energy) for pause in mean.full.added]
+    found = _summed(rows, mean.cycles)
     # the sums are those of the cycle, whatever the meter's counter rounds
-    times = seconds / (sum(share.seconds for share in found.values()) or 1.0)
-    joules = energy / (sum(share.energy for share in found.values()) or 1.0)
+    times = mean.seconds / (sum(share.seconds for share in found.values()) or 1.0)
+    joules = mean.energy / (sum(share.energy for share in found.values()) or 1.0)
     return {
         name: Share(name, share.seconds * times, share.energy * joules)
         for name, share in found.items()
@@ -365,29 +373,22 @@ def _added(program: ProgramTotals | None) -> tuple[FullPause, ...]:
     return full.added if full is not None else ()
 
 
-def _steps(
-    analysis: Analysis,
-    full: Unshortened | None,
-    seconds: float,
-    energy: float,
-    cycles: float,
-    time: Span,
-) -> dict[str, Share]:
+def _steps(mean: _Mean) -> dict[str, Share]:
     """Shares of the movements and pauses in a time, and of the waiting between them."""
     rows = [
         (result.step.label, result.seconds, result.energy)
-        for result in analysis.steps
-        if time.begin <= result.step.start <= time.end
+        for result in mean.analysis.steps
+        if mean.time.begin <= result.step.start <= mean.time.end
     ]
-    if full is not None:
+    if mean.full is not None:
         rows += [
-            (analysis.steps[pause.step].step.label, pause.seconds, pause.energy)
-            for pause in full.added
+            (mean.analysis.steps[pause.step].step.label, pause.seconds, pause.energy)
+            for pause in mean.full.added
         ]
-    found = _summed(rows, cycles)
+    found = _summed(rows, mean.cycles)
     if all(math.isfinite(joules) for _, _, joules in rows):
-        between = seconds - sum(share.seconds for share in found.values())
-        joules = energy - sum(share.energy for share in found.values())
+        between = mean.seconds - sum(share.seconds for share in found.values())
+        joules = mean.energy - sum(share.energy for share in found.values())
         if between > _STAMP:
             found[WAITING] = Share(WAITING, between, joules)
     return found
