@@ -23,7 +23,12 @@ def _rows(name: str, rng: np.random.Generator) -> list[Row]:
     limits = (robot.velocity_max, robot.acceleration_max, robot.jerk_max)
     threshold = np.full((1, len(model.pairs)), 0.02)
     terms = SplineTerms(
-        *limits, robot.position_min, robot.position_max, np.zeros(robot.n), threshold
+        *limits,
+        robot.position_min,
+        robot.position_max,
+        np.zeros(robot.n),
+        threshold,
+        time_value=robot.time_value,
     )
     u = np.clip((np.arange(CONTROL) - 2.0) / (CONTROL - 5.0), 0.0, 1.0)[:, None]
     span = rng.uniform(-0.2, 0.2, robot.n)

@@ -26,6 +26,7 @@ def terms(robot: RobotLiteral, pairs: int, **changes: Any) -> SplineTerms:
         robot.position_max,
         np.full(n, 20.0),
         np.full((1, pairs), 0.02),
+        time_value=500.0,
         capacity_energy=106.0,
     )
     return replace(default, **changes)

@@ -30,11 +30,11 @@ class SplineTerms:
     velocity, acceleration, jerk, low, high (n,): bounds, rad and s. travel (n,): cost per rad.
     threshold (R, Z) m: rows of safety distances, each interval of a spline says which row holds;
     -inf leaves a pair out. torque_share: of the envelope. energy_value: cost per joule; time_value:
-    per second. capacity_energy [J] and regeneration: see DcBusParameters; smoothing [W]: by how
-    much the bus' switch between mains,
-    capacitor and resistor is rounded, 0: not at all. clearance_margin, clearance_scale [m].
-    penalty,
-    clearance_penalty: cost per second of a relative excess of 1. tilt_axis (3,) in the last link
+    per second, 0 leaves it out (what a second is worth is the robot's or the request's to say).
+    capacity_energy [J] and regeneration: see DcBusParameters; smoothing [W]: by how much the bus'
+    switch between mains, capacitor and resistor is rounded, 0: not at all. clearance_margin,
+    clearance_scale [m]. penalty, clearance_penalty: cost per second of a relative excess of 1.
+    tilt_axis (3,) in the last link
     may lean by tilt_max [rad] from tilt_direction (3,) in the world, pi: as it likes; an excess of
     tilt_scale [rad] counts like one of 1, with clearance_penalty.
     """
@@ -48,7 +48,7 @@ class SplineTerms:
     threshold: FloatArray
     torque_share: float = 0.98
     energy_value: float = 1.0
-    time_value: float = 500.0
+    time_value: float = 0.0
     capacity_energy: float = 0.0
     regeneration: Regeneration = "shared"
     smoothing: float = 0.0
@@ -141,7 +141,9 @@ def _unit(value: ArrayLike, name: str) -> FloatArray:
 
 
 def _thresholds(value: ArrayLike, pairs: int) -> FloatArray:
-    """(R, Z), R >= 1; without pairs there is nothing to read."""
+    """Safety distances (R, Z) [m] as they are given, checked: R >= 1 rows, of which every interval
+    of a spline names one, for the Z pairs of the collision model; without pairs (R, 0).
+    """
     name = "terms.threshold"
     if pairs == 0:
         rows = np.shape(value)

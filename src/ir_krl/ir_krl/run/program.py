@@ -473,8 +473,9 @@ class _Run(Moving):
                 self.memory.may_change(variable, name)
 
     def _computed(self, name: str, trees: list[Any], place: SourcePlace) -> Value:
-        """FORWARD and INVERSE, of the kinematics of the robot: 0 in their last argument, or 1 and
-        no value.
+        """The value of FORWARD (a pose [mm, deg] of axes [deg, mm]) or INVERSE (axes of a pose), by
+        the robot's kinematics with the tool and base that are valid at this place of the program.
+        Their last argument becomes 0, or 1 where there is no solution, and the value is unknown.
         """
         if len(trees) != COMPUTED[name] or any(one is None for one in trees):
             raise KrlRunError(

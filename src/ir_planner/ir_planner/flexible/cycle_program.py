@@ -261,8 +261,10 @@ def run_program(
 
 
 def _performed(cycle: SteadyCycle, cycles: int) -> Iterator[tuple[Visit, int, bool]]:
-    """The transports that find a part, cycle by cycle, with its number, and whether the cycle is
-    whole.
+    """The transports that find a part, cycle by cycle: the visit, the number of its part (0: the
+    first that is made), and whether the cycle is whole, that is, all of its transports find one.
+    The line fills in the first cycles, whose transports of earlier parts (numbers below 0) are left
+    out; it ends after so many whole ones.
     """
     made = 0
     whole = 0
@@ -270,6 +272,7 @@ def _performed(cycle: SteadyCycle, cycles: int) -> Iterator[tuple[Visit, int, bo
         numbered = [(visit, made + cycle.number(visit)) for visit in cycle.visits]
         done = [(visit, number) for visit, number in numbered if number >= 0]
         full = len(done) == len(numbered)
-        whole += full
+        if full:
+            whole += 1
         made += cycle.units
         yield from ((visit, number, full) for visit, number in done)
