@@ -13,7 +13,7 @@ from _regional_tasks import scene_of_cell
 
 from ir_description import Body, Cell, Equipment, load_cell
 from ir_description.cell import Zone
-from ir_description.cell.equipment import ZoneKind
+from ir_description.cell.zones import ZoneKind
 from ir_description.poses import pose_of
 from ir_values.arrays import FloatArray
 

@@ -16,7 +16,7 @@ from _drives import Drives
 from ir_description.robot import RobotModel
 from ir_kernels import CollisionModel
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.scene.contact_zones import tcp_inside
+from ir_planner.scene.allowed_contacts import tcp_inside
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 

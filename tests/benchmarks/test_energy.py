@@ -12,8 +12,8 @@ from _drives import Drives
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Goal, Planner
 from ir_planner.checks.energy import movement_energy
+from ir_planner.timing.jerk_limited_laws import GRID_S
 from ir_planner.timing.ptp import free_law
-from ir_planner.timing.time_law import GRID_S
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,8 @@ from _program_chains import Chains, least_cost, least_times, least_travel, poten
 
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Goal, Planner
+from ir_planner.timing.jerk_limited_laws import GRID_S
 from ir_planner.timing.ptp import free_law, path_limits
-from ir_planner.timing.time_law import GRID_S
 
 OBJECTIVES = ("time_and_energy", pytest.param("movement_cost", marks=pytest.mark.long))
 

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from ir_planner.scene.motion_limits import torque_use
 from ir_planner.scene.planning_scene import PlanningScene
+from ir_planner.timing.jerk_limited_laws import GRID_S, LEVELS, LevelLaw, level_laws
 from ir_planner.timing.ptp import fastest, fastest_law, fastest_levels, path_limits
-from ir_planner.timing.time_law import GRID_S, LEVELS, LevelLaw, level_laws
 
 level = st.lists(st.floats(0.3, 12.0), min_size=LEVELS, max_size=LEVELS)
 

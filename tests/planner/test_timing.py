@@ -30,12 +30,12 @@ from ir_planner.timing.blended_steps import (
     standing,
     stretched,
 )
+from ir_planner.timing.jerk_limited_laws import StepLaws, TimeLaw
 from ir_planner.timing.movement import Movement
 from ir_planner.timing.objective import best_stretch
 from ir_planner.timing.ptp import fastest, fastest_law
 from ir_planner.timing.spline_timing import time_spline
 from ir_planner.timing.straight_steps import own_laws, straight_steps
-from ir_planner.timing.time_law import StepLaws, TimeLaw
 
 _spec = importlib.util.spec_from_file_location(
     "planner_oracles", Path(__file__).parent / "oracles.py"

@@ -18,7 +18,7 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks.evaluation import evaluate_trajectory
 from ir_planner.checks.verification import verify
 from ir_planner.request.context import Context, Work
-from ir_planner.scene.contact_zones import polynomials_between
+from ir_planner.scene.allowed_contacts import polynomials_between
 from ir_planner.scene.planning_scene import PlanningScene, load_text, scene_with
 from ir_planner.timing.straight_steps import straight_steps
 

@@ -21,6 +21,7 @@ from pathlib import Path
 
 from ir_cli.errors import CommandError
 from ir_cli.output import Progress, table
+from ir_cli.planning import CEILING
 from ir_cli.ports import UDP, free_port
 from ir_cli.ros.power_tour import MODE_SECONDS, PowerWatch, tour
 from ir_cli.ros.processes import NodeProcesses, cell_nodes
@@ -282,7 +283,7 @@ class Demonstration:
         self._transitions = {} if real_pauses else TRANSITIONS
         self._patience = LONGEST_TRANSITION if real_pauses else MODE_SECONDS
         self._cell = full if real_pauses else with_short_pauses(full, LONGEST_PAUSE)
-        self._options = PlanOptions(seed=seed)
+        self._options = PlanOptions(seed=seed, planning_time=CEILING)
         self._link = LinkSettings(wake_port=free_port(UDP))
         loads = ("none", self._cell.tool.name) if self._cell.tool else ("none",)
         visited = full.robot.controller.has_table and not self._steps

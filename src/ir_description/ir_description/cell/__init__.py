@@ -28,8 +28,6 @@ from ir_description.cell.equipment import (
     SAMPLES_MAX,
     STARTS_MAX,
     SWITCH_MAX,
-    ZONE_KINDS,
-    ZONE_MAX,
     AllowedContact,
     CellPath,
     Equipment,
@@ -40,10 +38,8 @@ from ir_description.cell.equipment import (
     Station,
     StationSearch,
     ToolTilt,
-    Zone,
     begin_of_work,
     station_at,
-    zone_around,
 )
 from ir_description.cell.moving import cell_in, machine_in, sweep_speeds
 from ir_description.cell.part_routes import check_route, part_routes
@@ -66,6 +62,7 @@ from ir_description.cell.program import (
     StepVia,
 )
 from ir_description.cell.robot_cells import ROBOT_COUNT, RobotCells
+from ir_description.cell.zones import ZONE_KINDS, ZONE_MAX, Zone, zone_around
 
 __all__ = [
     "APPROACH_MAX",

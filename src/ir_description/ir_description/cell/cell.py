@@ -18,8 +18,6 @@ from ir_description.cell.equipment import (
     Equipment,
     Part,
     Station,
-    Zone,
-    zone_around,
 )
 from ir_description.cell.part_routes import check_route, part_routes
 from ir_description.cell.program import (
@@ -29,6 +27,7 @@ from ir_description.cell.program import (
     PartRoute,
     ProgramStep,
 )
+from ir_description.cell.zones import Zone, zone_around
 from ir_description.poses import composed, inverse
 from ir_description.robot import Load, RobotModel, total_mass
 from ir_description.shapes import Body, Capsule, floor_body
@@ -550,7 +549,8 @@ class Cell:
         ]
         equipment = self.equipment
         if machine.has_default_zone(mine[0]):
-            zone = zone_around(machine.zone_in_equipment.kind, machine.bodies, mine[1])
+            tcps = [station.pose_in_equipment[:3, 3] for station in mine[1]]
+            zone = zone_around(machine.zone_in_equipment.kind, machine.bodies, tcps)
             new = replace(machine, zone_in_equipment=zone)
             equipment = tuple(new if each is machine else each for each in equipment)
         return replace(self, stations=stations, equipment=equipment)

@@ -6,26 +6,22 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, get_args
 
 import numpy as np
 
-from ir_description.poses import composed, pose_of
+from ir_description.cell.zones import Zone, ZoneKind, zone_around
+from ir_description.poses import composed
 from ir_description.robot import UNLIMITED, Load, ToolLimits
-from ir_description.shapes import SIZE_MAX, Body
+from ir_description.shapes import Body
 from ir_kernels import portable
 from ir_msgs_py.cartesian import CartesianPath
-from ir_values.arrays import FloatArray, direction, frozen, frozen_pose, in_range, set_field
+from ir_values.arrays import FloatArray, direction, frozen_pose, in_range, set_field
 from ir_values.errors import InvalidValueError, UnknownNameError
 
-ZoneKind = Literal["OPEN", "SEMI_CLOSED", "CLOSED"]
-ZONE_KINDS: tuple[ZoneKind, ...] = get_args(ZoneKind)
 APPROACH_MAX = 5.0
-BLEND_MAX = 1.0
-"""m"""
 """Longest approach [m]."""
-ZONE_MAX = 10.0 * SIZE_MAX
-"""Largest edge [m] of a zone: it holds bodies far apart."""
+BLEND_MAX = 1.0
+"""Largest blend [m] of a stop that is passed without standing."""
 CONFIGURATION_SEARCHES = ("analytic", "ccd")
 STARTS_MAX = 10_000
 """Most random starts of a search for configurations."""
@@ -37,47 +33,6 @@ SAMPLES_MAX = 10_000
 """Most samples of a process."""
 CAPACITY_MAX = 4
 """Most parts that a machine works on at once, and most that its buffer holds."""
-
-
-@dataclass(frozen=True, eq=False)
-class Zone:
-    """A forbidden zone: an oriented box, pose (4, 4) of its centre and full size (3,) [m].
-
-    The kind is a name for pages and studies: it changes neither the zone nor a search.
-    """
-
-    kind: ZoneKind
-    pose: FloatArray
-    size: FloatArray
-
-    def __post_init__(self) -> None:
-        if self.kind not in ZONE_KINDS:
-            raise InvalidValueError(
-                f"kind of zone is {self.kind!r}, must be one of {', '.join(ZONE_KINDS)}"
-            )
-        object.__setattr__(self, "pose", frozen_pose(self.pose, "pose of the zone"))
-        object.__setattr__(self, "size", frozen(self.size, (3,), "size of the zone"))
-        if (self.size <= 0.0).any() or (self.size > ZONE_MAX).any():
-            raise InvalidValueError(
-                f"size of the zone is {self.size.tolist()} m, must be in (0, {ZONE_MAX:g}] m"
-            )
-
-
-def zone_around(kind: ZoneKind, bodies: Iterable[Body], stations: Iterable[Station] = ()) -> Zone:
-    """Return the box of a machine's bodies and its stations' tcps along the axes of its frame.
-
-    What stands on a table belongs to it, up to the height of the station above it. Planes don't
-    count. Raises InvalidValueError where there is nothing to enclose.
-    """
-    bounds = [body.bounds() for body in bodies if body.kind != "plane"]
-    if not bounds:
-        raise InvalidValueError(
-            "the zone has no bodies to enclose; give its box (zone: {kind, size, ...})"
-        )
-    tcps = [station.pose_in_equipment[:3, 3] for station in stations]
-    low = np.min([*(low for low, _ in bounds), *tcps], axis=0)
-    high = np.max([*(high for _, high in bounds), *tcps], axis=0)
-    return Zone(kind, pose_of((low + high) / 2.0), high - low)
 
 
 @dataclass(frozen=True)
@@ -212,7 +167,8 @@ class Equipment:
         if all(body.kind == "plane" for body in self.bodies):
             return False
         own = self.zone_in_equipment
-        default = zone_around(own.kind, self.bodies, stations)
+        tcps = [station.pose_in_equipment[:3, 3] for station in stations]
+        default = zone_around(own.kind, self.bodies, tcps)
         return np.array_equal(default.pose, own.pose) and np.array_equal(default.size, own.size)
 
     @cached_property

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ir_description.cell.cell import Cell, NameRegister
-from ir_description.cell.equipment import Equipment, Station, zone_around
+from ir_description.cell.equipment import Equipment, Station
+from ir_description.cell.zones import zone_around
 from ir_description.shapes import standing_capsule
 from ir_values.errors import UnknownNameError
 

@@ -333,11 +333,12 @@ def _pose(table: Table) -> FloatArray:
 
 def _zone(table: Table, bodies: tuple[Body, ...], stations: Iterable[Station] = ()) -> Zone:
     """A word is the kind around bodies and stations, a mapping may give the box."""
+    tcps = [station.pose_in_equipment[:3, 3] for station in stations]
     item = table.get("zone")
     if item is None or item.is_scalar():
         kind = "OPEN" if item is None else item.choice(ZONE_KINDS)
         with (item or table.item).blamed():
-            return zone_around(kind, bodies, stations)  # type: ignore[arg-type]
+            return zone_around(kind, bodies, tcps)  # type: ignore[arg-type]
     zone = item.table(("kind",), ("size", *POSE_KEYS))
     kind = zone["kind"].choice(ZONE_KINDS)
     with item.blamed():
@@ -345,7 +346,7 @@ def _zone(table: Table, bodies: tuple[Body, ...], stations: Iterable[Station] = 
             for key in POSE_KEYS:
                 if key in zone:
                     zone[key].fail("belongs to a zone with a size")
-            return zone_around(kind, bodies, stations)  # type: ignore[arg-type]
+            return zone_around(kind, bodies, tcps)  # type: ignore[arg-type]
         size = zone["size"].numbers(3, 0.0, ZONE_MAX, "m", above=True)
         return Zone(kind, pose_in(zone), size)  # type: ignore[arg-type]
 

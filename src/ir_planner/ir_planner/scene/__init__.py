@@ -3,7 +3,7 @@ W.
 """
 
 from ir_planner.scene.actuators import LinkVoltage
-from ir_planner.scene.contact_zones import polynomials_between, spans_outside, tcp_inside
+from ir_planner.scene.allowed_contacts import polynomials_between, spans_outside, tcp_inside
 from ir_planner.scene.motion_limits import STILL, Dynamics, MotionLimits, lasting_longer, torque_use
 from ir_planner.scene.movement_cost import movement_cost, path_cost
 from ir_planner.scene.planning_scene import (

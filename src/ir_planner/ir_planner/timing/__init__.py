@@ -2,6 +2,7 @@
 
 from ir_planner.timing.baseline import baseline, baseline_costs_at_least
 from ir_planner.timing.blended_steps import TimedPath, blended, standing, stretched
+from ir_planner.timing.jerk_limited_laws import GRID_NS, GRID_S, StepLaws, TimeLaw
 from ir_planner.timing.movement import TORQUE_SHARES, Movement, within_torque
 from ir_planner.timing.objective import (
     DURATION_SLACK,
@@ -20,7 +21,6 @@ from ir_planner.timing.ptp import TOO_HEAVY, fastest, free_law
 from ir_planner.timing.reserve import need_of, with_less_reserve
 from ir_planner.timing.spline_timing import time_spline
 from ir_planner.timing.straight_steps import distinct, straight_steps
-from ir_planner.timing.time_law import GRID_NS, GRID_S, StepLaws, TimeLaw
 
 __all__ = [
     "DURATION_SLACK",

@@ -11,6 +11,7 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.request import Context
 from ir_planner.scene import STILL, MotionLimits
 from ir_planner.timing.blended_steps import TimedPath, blended, stretched
+from ir_planner.timing.jerk_limited_laws import StepLaws
 from ir_planner.timing.movement import Movement, within_torque
 from ir_planner.timing.objective import (
     DURATION_SLACK,
@@ -19,7 +20,6 @@ from ir_planner.timing.objective import (
     slowed_for_tool,
 )
 from ir_planner.timing.ptp import free_law, path_limits, torque_per_segment
-from ir_planner.timing.time_law import StepLaws
 from ir_values.arrays import FloatArray
 
 _ROUNDS = 25  # gravity doesn't fall with speed: a load near the envelope takes several

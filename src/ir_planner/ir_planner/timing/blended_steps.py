@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ir_msgs_py.trajectory import JointTrajectory
-from ir_planner.timing.time_law import GRID_NS, StepLaws
+from ir_planner.timing.jerk_limited_laws import GRID_NS, StepLaws
 from ir_values.arrays import FloatArray, IntArray
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.errors import TimingError
 from ir_planner.scene import STILL, Dynamics, MotionLimits, torque_use
-from ir_planner.timing.time_law import (
+from ir_planner.timing.jerk_limited_laws import (
     GRID_S,
     LEVELS,
     Law,

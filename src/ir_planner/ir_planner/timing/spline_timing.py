@@ -17,8 +17,8 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import extremes, natural_durations, spline_through, virtual_knots
 from ir_planner.errors import TimingError
 from ir_planner.scene import Dynamics, MotionLimits, lasting_longer, torque_use
+from ir_planner.timing.jerk_limited_laws import GRID_NS, GRID_S
 from ir_planner.timing.ptp import torque_per_segment
-from ir_planner.timing.time_law import GRID_NS, GRID_S
 from ir_values.arrays import FloatArray, IntArray
 
 # The use of limits by the spline of `spline_through` from rest to rest, interval by interval: for

@@ -18,10 +18,17 @@ from ir_planner.curves import extremes
 from ir_planner.request import Context
 from ir_planner.scene import STILL, Dynamics, MotionLimits, lasting_longer, torque_use
 from ir_planner.timing.blended_steps import TimedPath, blended, largest_overlaps, standing
+from ir_planner.timing.jerk_limited_laws import (
+    GRID_S,
+    Law,
+    LawLimits,
+    StepLaws,
+    TimeLaw,
+    phase_steps,
+)
 from ir_planner.timing.movement import Movement, within_torque
 from ir_planner.timing.objective import at_best_duration, coarse_energy_cost
 from ir_planner.timing.ptp import fastest, fastest_law, torque_per_segment
-from ir_planner.timing.time_law import GRID_S, Law, LawLimits, StepLaws, TimeLaw, phase_steps
 from ir_values.arrays import FloatArray
 
 # Asynchronous PTP: every joint takes its own time and stops when it has arrived. Where all of the

@@ -1,4 +1,4 @@
-"""Time laws s(t) from 0 to 1, at rest at both ends, on a grid of 1 ms.
+"""Jerk-limited time laws s(t) from 0 to 1, at rest at both ends, on a grid of 1 ms.
 
 A TimeLaw has seven phases of constant jerk: jerk up, constant acceleration, jerk down, constant
 speed, and the same for braking; the two halves may differ. A LevelLaw steps down in levels, with

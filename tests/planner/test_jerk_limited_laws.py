@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ir_planner.timing.time_law import (
+from ir_planner.timing.jerk_limited_laws import (
     GRID_S,
     LawLimits,
     TimeLaw,

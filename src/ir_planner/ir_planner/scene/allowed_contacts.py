@@ -1,4 +1,4 @@
-"""Where a station's allowed contacts hold: while the tcp is in its machine's zone, or nearer to it
+"""Where allowed contacts of a station hold: while the tcp is in its machine's zone, or nearer to it
 than S_m.
 
 Outside, every pair keeps S_m. A trajectory is cut where its tcp leaves or enters; the parts outside
