@@ -153,3 +153,67 @@ def test_movements_are_planned_that_identify_an_own_robot(cell: str, tmp_path: P
     words = [cell, "--seconds", "3", "--postures", "1", "-o", str(tmp_path / "out")]
     assert main(["energy", "excite", *words]) == 0
     assert (tmp_path / "out" / "programme.yaml").is_file()
+
+
+def rtde_log(folder: Path, *, timed: bool) -> Path:
+    """What a UR-like controller logs of movements of a KR 6 at 100 Hz: positions, speeds, power."""
+    samples = motion(load_cell("kr6_bench").robot, 8.0)
+    watts = 200.0 + 50.0 * np.abs(samples.qd).sum(axis=1)
+    columns = [samples.q, samples.qd, np.full(len(watts), 48.0), watts / 48.0]
+    heads = [f"actual_q_{k}" for k in range(6)] + [f"actual_qd_{k}" for k in range(6)]
+    heads += ["actual_robot_voltage", "actual_robot_current"]
+    if timed:
+        columns = [samples.time, *columns]
+        heads = ["timestamp", *heads]
+    path = folder / f"log_{timed}.csv"
+    np.savetxt(path, np.column_stack(columns), "%.9g", ",", header=",".join(heads), comments="")
+    return path
+
+
+def compared(capsys: pytest.CaptureFixture[str], *words: str) -> list[dict[str, float]]:
+    words = ("energy", "compare", *words, "--cell", "kr6_bench", "--load", "none", "--json")
+    assert main(list(words)) == 0
+    rows: list[dict[str, float]] = json.loads(capsys.readouterr().out)["movements"]
+    return rows
+
+
+def test_a_log_without_time_is_compared_by_its_rate(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    timed = compared(capsys, str(rtde_log(tmp_path, timed=True)))
+    bare = compared(capsys, str(rtde_log(tmp_path, timed=False)), "--rate", "100")
+    assert len(bare) == len(timed) > 2
+    for one, other in zip(bare, timed, strict=True):
+        assert one["seconds"] == pytest.approx(other["seconds"], abs=0.02)
+        assert one["direct"] == pytest.approx(other["direct"], rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "ir energy --rate"),
+        (["--rate", "0"], "--rate is 0 Hz"),
+        (["--rate", "nan"], "--rate is nan Hz"),
+        (["--rate", "25"], "times as fast as its recorded speed says"),
+        (["--rate", "400"], "times as fast as its recorded speed says"),
+    ],
+)
+def test_a_rate_that_is_missing_or_wrong_is_refused(
+    words: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = rtde_log(tmp_path, timed=False)
+    asked = ["energy", "compare", str(path), "--cell", "kr6_bench", "--load", "none", *words]
+    assert main(asked) != 0
+    assert said in capsys.readouterr().err
+
+
+def test_a_rate_beside_a_mapping_of_the_time_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mapping = tmp_path / "map.yaml"
+    mapping.write_text("format: ir_trace/1\ncolumns: {time: {step: 10, unit: ms}}\n")
+    path = str(rtde_log(tmp_path, timed=False))
+    words = ["--cell", "kr6_bench", "--mapping", str(mapping)]
+    assert main(["energy", "compare", path, "--load", "none", *words]) == 0
+    assert main(["energy", "compare", path, *words, "--rate", "100"]) != 0
+    assert "the mapping (--mapping) has one" in capsys.readouterr().err

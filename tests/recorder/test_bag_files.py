@@ -13,7 +13,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from ir_recorder.errors import RecorderError
-from ir_recorder.traces import read_traces
+from ir_recorder.traces import Trace, read_mapping, read_traces
 
 NAMES = ("joint_a1", "joint_a2")
 
@@ -108,6 +108,46 @@ def test_states_are_read_and_not_commands_however_many(tmp_path: Path) -> None:
     (trace,) = read_traces(path, None, NAMES)
     assert trace.columns["joint_a2"] == pytest.approx(-0.2 * np.arange(20))
     assert "/joint_commands" in trace.problems[0]
+
+
+def read_by(path: Path, mapping: str) -> Trace:
+    """The trace by a mapping of these lines."""
+    file = path.with_suffix(".yaml")
+    file.write_text(f"format: ir_trace/1\n{mapping}\n")
+    return read_traces(path, read_mapping(file), NAMES)[0]
+
+
+def test_of_topics_that_may_be_commands_none_is_read_without_being_named(tmp_path: Path) -> None:
+    commands = states(40)
+    for each in commands:
+        each.position = [9.0, 9.0]
+    path = bag(tmp_path / "run.db3", states(20))
+    raw = [serialize_message(each) for each in commands]
+    with_topic(path, "/servo/in", "sensor_msgs/msg/JointState", raw, first=True)
+    with sqlite3.connect(path) as file:
+        file.execute("UPDATE topics SET name = '/servo/out' WHERE id = 1")
+    with pytest.raises(RecorderError, match=r"/servo/in, /servo/out are all of .* as topic: "):
+        read_traces(path, None, NAMES)
+    assert read_by(path, "topic: servo/out").columns["joint_a2"][-1] == pytest.approx(-3.8)
+    assert read_by(path, "topic: /servo/in").columns["joint_a2"][-1] == pytest.approx(9.0)
+    with pytest.raises(RecorderError, match="there is no topic /servo of"):
+        read_by(path, "topic: /servo")
+
+
+def test_states_without_names_have_those_of_a_mapping(tmp_path: Path) -> None:
+    bare = states(20)
+    for each in bare:
+        each.name = []
+    path = bag(tmp_path / "run.db3", bare)
+    with pytest.raises(RecorderError, match="name no joint: a mapping"):
+        read_traces(path, None, NAMES)
+    trace = read_by(path, "joints: [joint_a2, joint_a1]")
+    assert trace.columns["joint_a1"] == pytest.approx(-0.2 * np.arange(20))
+    assert trace.columns["joint_a2"] == pytest.approx(0.1 * np.arange(20))
+    assert trace.columns["joint_a2_effort"] == pytest.approx(np.arange(20))
+    for joints, number in (("[joint_a1]", 1), ("[joint_a1, joint_a2, joint_a3]", 3)):
+        with pytest.raises(RecorderError, match=f"has 2 positions, the mapping names {number}"):
+            read_by(path, f"joints: {joints}")
 
 
 def test_a_topic_of_power_is_named_as_not_read(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ir_recorder.errors import RecorderError
-from ir_recorder.traces import Trace, read_mapping, read_traces
+from ir_recorder.traces import Trace, TraceMapping, read_mapping, read_traces
 
 NAMES = tuple(f"joint_a{k}" for k in range(1, 7))
 HOME = np.array([0.0, -90.0, 90.0, 0.0, 30.0, 0.0])  # deg
@@ -49,6 +49,10 @@ def check(trace: Trace, step: float) -> None:
     ("time", "pattern", "first", "unit", "scale"),
     [
         ("timestamp", "actual_q_{}", 0, 1.0, 1.0),
+        ("timestamp", "actual_q_{}", 1, 1.0, 1.0),
+        ("timestamp", "actual_q[{}]", 0, 1.0, 1.0),
+        ("timestamp", "actual_q[{}]", 1, 1.0, 1.0),
+        ("timestamp [ms]", "actual_q[{}] (deg)", 0, 180 / np.pi, 1e3),
         ("IPOC", "AIPos.A{}", 1, 180 / np.pi, 1e3),
         ("Time [ms]", "AXIS_ACT.A{} [deg]", 1, 180 / np.pi, 1e3),
         ("Zeit [s]", "$AXIS_ACT_A{}", 1, 180 / np.pi, 1.0),
@@ -213,6 +217,77 @@ def test_power_of_a_ur_is_its_voltage_times_its_current(tmp_path: Path) -> None:
     trace = read(tmp_path / "log.csv")
     check(trace, 0.008)
     assert trace.columns["power"] == pytest.approx(volts * amperes)
+
+
+def test_rows_that_are_counted_are_no_time_beside_the_clock_of_the_controller(
+    tmp_path: Path,
+) -> None:
+    """Logs that went through a spreadsheet number their rows in a column time."""
+    counted = np.column_stack([np.arange(1, COUNT + 1), timed(0.04, np.radians(degrees()))])
+    heads = ["time", "timestamp", *(f"actual_q_{k}" for k in range(6))]
+    trace = read(table(tmp_path / "log.csv", heads, counted))
+    check(trace, 0.04)
+    assert "timestamp as time, not time" in trace.problems[0]
+
+
+def vectors(between: str, ends: str) -> list[str]:
+    """Lines with all positions in one cell."""
+    heads = '"timestamp";"actual_q";"actual_qd";"actual_robot_voltage";"actual_robot_current"'
+    cells = [between.join(map(repr, row)) for row in np.radians(degrees()).tolist()]
+    rest = f"[{', '.join('0' * 6)}];48;2"
+    rows = [f'{0.008 * k};"{ends[0]}{each}{ends[1]}";{rest}' for k, each in enumerate(cells)]
+    return [heads, *rows, ""]
+
+
+@pytest.mark.parametrize("sign", [";", ","])
+@pytest.mark.parametrize(("between", "ends"), [(", ", "[]"), (" ", "[]"), (",", "()")])
+def test_vectors_in_one_cell_are_columns_of_their_own(
+    tmp_path: Path, between: str, ends: str, sign: str
+) -> None:
+    lines = vectors(between, ends)
+    if sign == ",":
+        rows = [line.replace('"', "").split(";") for line in lines[:-1]]
+        lines = [*(",".join(f'"{cell}"' for cell in row) for row in rows), ""]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(lines))
+    trace = read(path)
+    check(trace, 0.008)
+    assert trace.columns["power"] == pytest.approx(96.0)
+    assert trace.columns["joint_a6_velocity"] == pytest.approx(0.0)
+
+
+def test_a_vector_of_another_length_is_named_with_its_line(tmp_path: Path) -> None:
+    lines = vectors(", ", "[]")
+    lines[7] = lines[7].replace("[", "[0.5, ", 1)
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(lines))
+    with pytest.raises(RecorderError, match=":8: has 16 values, the header and the first row name"):
+        read(path)
+
+
+def test_a_log_of_a_ur_without_joints_is_a_meter(tmp_path: Path) -> None:
+    heads = ["timestamp", "actual_TCP_pose_0", "actual_robot_voltage", "actual_robot_current"]
+    rows = timed(0.008, np.tile([0.3, 48.0, 1.5], (COUNT, 1)))
+    trace = read(table(tmp_path / "log.csv", heads, rows))
+    assert trace.period == pytest.approx(0.008)
+    assert trace.columns["power"] == pytest.approx(72.0)
+    assert "timestamp is taken as time" in trace.problems[0]
+
+
+@pytest.mark.parametrize("pattern", ["joint_a{}", "actual_q_{}", "A{}_deg"])
+def test_a_log_without_time_is_read_by_its_step(tmp_path: Path, pattern: str) -> None:
+    """Also where a column numbers the rows."""
+    scale = 180 / np.pi if "deg" in pattern else 1.0
+    first = 0 if "actual" in pattern else 1
+    heads = ["time", *(pattern.format(first + k) for k in range(6))]
+    counted = timed(1.0, scale * np.radians(degrees()))
+    path = table(tmp_path / "log.csv", heads, counted)
+    bare = table(tmp_path / "bare.csv", heads[1:], counted[:, 1:])
+    for each in (path, bare):
+        (trace,) = read_traces(each, TraceMapping(step=0.008), NAMES)
+        check(trace, 0.008)
+    with pytest.raises(RecorderError, match="ir energy --rate"):
+        read(bare)
 
 
 UR = ["timestamp", *(f"actual_q_{k}" for k in range(6))]

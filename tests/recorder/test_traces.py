@@ -67,6 +67,42 @@ def test_a_mapping_names_columns_units_and_the_clock(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("headings", "seconds", "watts"),
+    [
+        ("Time_s,Power [kW]", 1.0, 2000.0),
+        ("TIME [ms],POWER_W", 1e-3, 2.0),
+        ("timestamp [us],Power (W)", 1e-6, 2.0),
+        ("time,power,Power [kW]", 1.0, 2.0),  # the plain writing comes first
+    ],
+)
+def test_time_and_meter_are_known_in_capitals_with_a_unit(
+    headings: str, seconds: float, watts: float, tmp_path: Path
+) -> None:
+    more = ",7" * (headings.count(",") - 1)
+    text = f"{headings}\n0,2{more}\n5,2{more}\n"
+    (trace,) = read_traces(written(tmp_path, text), joint_names=JOINTS)
+    assert trace.time[-1] == pytest.approx(5.0 * seconds)
+    assert trace.columns["power"] == pytest.approx([watts, watts])
+
+
+@pytest.mark.parametrize(
+    ("headings", "sentence"),
+    [
+        ("timestamp,power", "column timestamp has no unit"),
+        ("Time,power", "column Time has no unit"),
+        ("Time_s,timestamp_ms", "column time is there twice: Time_s and timestamp_ms"),
+        ("time,Power [kW],POWER_W", "column power is there twice"),
+    ],
+)
+def test_what_other_writings_leave_open_is_refused(
+    headings: str, sentence: str, tmp_path: Path
+) -> None:
+    row = ",".join("1" * (headings.count(",") + 1))
+    with pytest.raises(RecorderError, match=sentence):
+        read_traces(written(tmp_path, f"{headings}\n{row}\n"), joint_names=JOINTS)
+
+
+@pytest.mark.parametrize(
     ("content", "sentence"),
     [
         ("", "has 0 points"),
@@ -200,6 +236,8 @@ def test_every_writing_of_the_same_numbers_is_read_alike(
             "format: ir_trace/1\ncolumns: {time: {column: t, unit: miles}}",
             "unit 'miles' is unknown",
         ),
+        ("format: ir_trace/1\njoints: [a, a]", "joints must be a list of names"),
+        ("format: ir_trace/1\ntopic: [a]", "topic is"),
         (
             "format: ir_trace/1\ncolumns: {time: t}\nclock_offset: soon",
             "must be a number of seconds",

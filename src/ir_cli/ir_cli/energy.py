@@ -7,7 +7,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -50,7 +50,8 @@ from ir_recorder.fit import sentences as fit_sentences
 from ir_recorder.measure import PowerModel, movements
 from ir_recorder.measure.arm import available, pinocchio_torques
 from ir_recorder.report.files import write_output
-from ir_recorder.traces import read_mapping
+from ir_recorder.traces import TraceMapping, read_mapping
+from ir_recorder.traces.trace import TIME
 from ir_values.files import ANYWHERE
 
 COMPARED: Columns = {
@@ -101,6 +102,12 @@ def _add_sources(parser: argparse.ArgumentParser, what: str) -> None:
     )
     parser.add_argument(
         "--mapping", type=Path, metavar="FILE", help="what the columns of the joints mean"
+    )
+    parser.add_argument(
+        "--rate",
+        type=float,
+        metavar="HZ",
+        help="rows per second of logs of the joints without a column of time",
     )
     parser.add_argument(
         "--meter-mapping", type=Path, metavar="FILE", help="what those of the meter mean"
@@ -267,7 +274,9 @@ def _asked(arguments: argparse.Namespace) -> tuple[list[DataSource], PowerParame
     """What was recorded, and the parameters to begin with."""
     with sentences():
         cell = load_cell(arguments.cell) if arguments.cell else None
-    motion = arguments.mapping
+    motion = read_mapping(arguments.mapping) if arguments.mapping else None
+    if arguments.rate is not None:
+        motion = _at_rate(motion or TraceMapping(), arguments.rate)
     meter = arguments.meter_mapping
     meters = arguments.meter or [None] * len(arguments.motion)
     if len(meters) != len(arguments.motion):
@@ -278,7 +287,7 @@ def _asked(arguments: argparse.Namespace) -> tuple[list[DataSource], PowerParame
         DataSource(
             path,
             beside,
-            read_mapping(motion) if motion else None,
+            motion,
             read_mapping(meter) if meter else None,
             cell,
             arguments.load,
@@ -288,6 +297,21 @@ def _asked(arguments: argparse.Namespace) -> tuple[list[DataSource], PowerParame
     with sentences():
         robot = source_cell(sources[0]).robot
         return sources, load_power_parameters(arguments.power_parameters, robot)
+
+
+_RATES = (1e-3, 1e5)  # Hz
+
+
+def _at_rate(mapping: TraceMapping, rate: float) -> TraceMapping:
+    """The mapping of logs with so many rows per second. InputError for what is no rate, or where
+    the mapping has a time.
+    """
+    low, high = _RATES
+    if not low <= rate <= high:
+        raise InputError(f"--rate is {rate:.12g} Hz, must be {low:g} to {high:g} Hz")
+    if TIME in mapping.columns or not np.isnan(mapping.step):
+        raise InputError("--rate is for logs without time, the mapping (--mapping) has one")
+    return replace(mapping, step=1.0 / rate)
 
 
 def run_fit(arguments: argparse.Namespace) -> int:

@@ -15,12 +15,12 @@ from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_recorder.analysis.loads import LoadTimeline, carried, load_timeline, normal
 from ir_recorder.errors import RecorderError
 from ir_recorder.measure import PowerModel, Samples, samples_of
-from ir_recorder.measure.samples import STEP, LoadRuns
+from ir_recorder.measure.samples import MOVING, STEP, LoadRuns
 from ir_recorder.reading.reader import read_recording
 from ir_recorder.reading.recording import Recording
 from ir_recorder.traces import ClockOffset, Trace, TraceMapping, clock_offset, read_traces
 from ir_recorder.traces.reader import recorded_traces
-from ir_recorder.traces.trace import CURRENT, EFFORT, LOAD
+from ir_recorder.traces.trace import CURRENT, EFFORT, LOAD, VELOCITY
 from ir_values.arrays import BoolArray, FloatArray
 from ir_values.errors import InvalidValueError
 
@@ -46,7 +46,7 @@ def attached_cell(recording: Recording | None) -> Cell:
 
 MOST_UNEXPLAINED = 0.5  # of the mean power: plants that are fitted leave a tenth at most
 _BEYOND = 0.2  # rad outside a joint's range: referencing and a worn stop are less
-_FEWEST = 20  # windows
+_FEWEST = 20  # windows, or rows
 _SELDOM = 0.25  # s: within it an axis is accelerated and braked again
 
 
@@ -192,6 +192,44 @@ def check_speed(source: str, robot: RobotModel, qd: FloatArray) -> None:
         )
 
 
+_ALIKE = 0.8  # correlation of recorded speeds with those of the positions: they are of one motion
+_OTHER = 1.3  # times the recorded speed, or one in so many: of another unit or clock
+
+
+def check_clock(joints: Trace, names: Sequence[str]) -> None:
+    """RecorderError where positions change by a multiple of what the recorded speeds say."""
+    positions = joints.joints(names)
+    speeds = joints.joints(names, VELOCITY)
+    if positions is None or speeds is None:
+        return
+    steps = joints.time[2:] - joints.time[:-2]
+    moved = (positions[2:] - positions[:-2]) / steps[:, None]
+    for name, own, said in zip(names, moved.T, speeds[1:-1].T, strict=True):
+        times = _times_as_fast(own, said)
+        if not 1.0 / _OTHER < times < _OTHER:
+            raise RecorderError(
+                f"{joints.source}: positions of {name} change {times:.3g} times as fast as its "
+                "recorded speed says: is the time right (a row's number is none), are the units "
+                "of positions and speeds, and are both of this joint?"
+            )
+
+
+def _times_as_fast(moved: FloatArray, said: FloatArray) -> float:
+    """How many times as fast a joint moves, by its positions (N,), as its recorded speed (N,) says;
+    1 where the two are not of one motion, or of none.
+    """
+    known = np.isfinite(moved) & np.isfinite(said)
+    moved = moved[known]
+    said = said[known]
+    if len(said) < _FEWEST or np.abs(said).max() < MOVING:
+        return 1.0
+    product = float(moved @ said)
+    power = float(said @ said)
+    if abs(product) < _ALIKE * np.sqrt(float(moved @ moved) * power):
+        return 1.0
+    return product / power
+
+
 # What a fit is made from: a recording, or traces of joints and of a power meter with its own
 # clock.
 
@@ -299,6 +337,7 @@ def _run(
     positions = joints.joints(cell.robot.joint_names)
     assert positions is not None  # the trace was chosen for them
     check_range(joints.source, cell.robot, positions)
+    check_clock(joints, cell.robot.joint_names)
     meter = _metered(traces)
     added = np.nan
     notes = [*_said(traces), *turned]

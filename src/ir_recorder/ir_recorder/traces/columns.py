@@ -13,7 +13,7 @@ from typing import Any
 from ir_description import DescriptionFileError
 from ir_description.files import plain_yaml
 from ir_recorder.errors import RecorderError
-from ir_recorder.traces.trace import TIME
+from ir_recorder.traces.trace import ENERGY, POWER, TIME
 from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError
 
@@ -54,6 +54,7 @@ FACTORS: dict[str, float] = {
 """SI value of one of each unit, by its lower-case name."""
 
 _BRACKETS = re.compile(r"^(?P<name>[^\[\(]+?)\s*[\[\(]\s*(?P<unit>[^\]\)]+?)\s*[\]\)]$")
+_INDEX = re.compile(r"\s*[\[\(]\s*(?P<number>\d+)\s*[\]\)]")  # of a vector: actual_q[0]
 _ENDING = re.compile(r"^(?P<name>.+)_(?P<unit>[a-zA-Z]+)$")
 
 
@@ -81,9 +82,9 @@ def parsed(heading: str, where: str) -> tuple[str, float]:
 
 def split_unit(heading: str) -> tuple[str, str]:
     """Name and unit of a heading, in brackets or behind the last "_" where it is a known one; ""
-    where there is none.
+    where there is none. The number of an entry in brackets is a part of the name, behind a "_".
     """
-    heading = heading.strip()
+    heading = _INDEX.sub(r"_\g<number>", heading.strip())
     found = _BRACKETS.match(heading)
     if found:
         return found["name"].strip(), found["unit"].strip()
@@ -104,7 +105,7 @@ def split_unit(heading: str) -> tuple[str, str]:
 FORMAT = "ir_trace/1"
 _STEP_MAX = 3600.0  # s
 _MOST_FACTORS = 4  # of a product: voltage, current, share
-_KEYS = ("format", "columns", "clock_offset", "power_is")
+_KEYS = ("format", "columns", "clock_offset", "power_is", "topic", "joints")
 
 
 @dataclass(frozen=True)
@@ -125,13 +126,16 @@ class TraceMapping:
 
     clock_offset [s] is added to the file's time, NaN where it is to be found by comparing. sampled:
     power is the value of an instant, else the mean since the row before. step [s]: between rows of
-    a file without a column of time; NaN: it has one.
+    a file without a column of time; NaN: it has one. Of a bag, topic: of its joint states; joints:
+    their names in the order of messages that name none.
     """
 
     columns: Mapping[str, Column] = field(default_factory=lambda: MappingProxyType({}))
     clock_offset: float = math.nan
     sampled: bool = False
     step: float = math.nan
+    topic: str = ""
+    joints: tuple[str, ...] = ()
 
 
 def read_mapping(path: Path) -> TraceMapping:
@@ -150,10 +154,12 @@ def read_mapping(path: Path) -> TraceMapping:
     meaning = tree.get("power_is", "mean")
     if meaning not in ("mean", "sample"):
         raise RecorderError(f"{path}: power_is is {str(meaning)[:40]!r}, it must be mean or sample")
-    columns = tree.get("columns")
-    if not isinstance(columns, dict) or TIME not in columns:
+    topic, joints = _of_bag(path, tree)
+    columns = tree.get("columns", {} if topic or joints else None)
+    needed = bool(columns) or not (topic or joints)
+    if not isinstance(columns, dict) or (needed and TIME not in columns):
         raise RecorderError(f"{path}: columns must name at least time")
-    step = _step(f"{path}: {TIME}", columns[TIME])
+    step = _step(f"{path}: {TIME}", columns.get(TIME))
     return TraceMapping(
         MappingProxyType(
             {
@@ -165,7 +171,21 @@ def read_mapping(path: Path) -> TraceMapping:
         _offset(path, tree),
         meaning == "sample",
         step,
+        topic,
+        joints,
     )
+
+
+def _of_bag(path: Path, tree: Mapping[str, Any]) -> tuple[str, tuple[str, ...]]:
+    """Topic and names of the joint states of a bag, as far as they are given."""
+    topic = tree.get("topic", "")
+    joints = tree.get("joints", [])
+    if not isinstance(topic, str):
+        raise RecorderError(f"{path}: topic is {str(topic)[:40]!r}, it must be the name of one")
+    names = isinstance(joints, list) and all(isinstance(each, str) and each for each in joints)
+    if not names or len(set(joints)) < len(joints):
+        raise RecorderError(f"{path}: joints must be a list of names, each once")
+    return topic, tuple(joints)
 
 
 def _step(where: str, tree: Any) -> float:
@@ -239,6 +259,18 @@ def chosen(
     """Place and factor to SI of each column by its name; RecorderError without a time, or with two
     of a name.
     """
+    if mapping.columns:
+        places = _mapped(headings, where, mapping)
+    else:
+        places = _by_heading(headings, where, wanted, timed=math.isnan(mapping.step))
+    if TIME not in places and math.isnan(mapping.step):
+        raise RecorderError(f"{where}: {without_time(headings)}")
+    return places
+
+
+def _mapped(
+    headings: Sequence[str], where: str, mapping: TraceMapping
+) -> dict[str, tuple[int, float]]:
     places: dict[str, tuple[int, float]] = {}
     for name, column in _all_columns(mapping):
         if column.number:
@@ -255,19 +287,45 @@ def chosen(
         if headings.count(column.heading) > 1:
             raise RecorderError(f"{where}: column {column.heading[:80]} is there twice")
         places[name] = headings.index(column.heading), column.factor
-    for k, heading in enumerate([] if mapping.columns else headings):
+    return places
+
+
+def _by_heading(
+    headings: Sequence[str], where: str, wanted: Wanted, *, timed: bool
+) -> dict[str, tuple[int, float]]:
+    """timed: a column says the time."""
+    places: dict[str, tuple[int, float]] = {}
+    for k, heading in enumerate(headings):
         name, scale = named(heading, where, wanted)
-        if not wanted(name):
+        if not wanted(name) or (name == TIME and not timed):
             continue
         if name in places:
             raise RecorderError(f"{where}: column {name} is there twice")
         places[name] = k, scale
-    if TIME not in places and math.isnan(mapping.step):
-        raise RecorderError(
-            f"{where}: there is no column time, {_known(headings)}; a mapping gives the step "
-            "between rows of a file without it: columns: {time: {step: 4, unit: ms}}"
-        )
+    for name in (TIME, POWER, ENERGY) if timed else (POWER, ENERGY):
+        found = other_writing(headings, where, name) if name not in places else None
+        if found is not None:
+            places[name] = found
     return places
+
+
+TIMES = ("time", "zeit", "t", "timestamp")
+"""What logs call their time; names other than the first need a unit."""
+
+
+def without_time(headings: Sequence[str]) -> str:
+    """What to do about a table in which no heading says that it is the time."""
+    nearly = next((each for each in headings if split_unit(each)[0].lower() in TIMES), "")
+    if nearly:
+        return (
+            f"column {nearly[:40]} has no unit: write it into the heading, as {nearly[:40]} [s], "
+            "or into a mapping (--mapping)"
+        )
+    return (
+        f"there is no column time, {_known(headings)}; of a file without it the rows per second "
+        "are given by ir energy --rate, or their step by a mapping (--mapping): columns: "
+        "{time: {step: 4, unit: ms}}"
+    )
 
 
 _TIMES = " x "  # between the name of a product and the number of its factor
@@ -298,6 +356,24 @@ def named(heading: str, where: str, wanted: Wanted) -> tuple[str, float]:
     if wanted(heading) or (bare != heading and not wanted(bare)):
         return heading, 1.0
     return parsed(heading, where)
+
+
+def other_writing(headings: Sequence[str], where: str, name: str) -> tuple[int, float] | None:
+    """Place and factor of the column of time, power or energy in capitals or, for the time, by
+    another of TIMES: only with a unit. RecorderError where there are several.
+    """
+    known = TIMES if name == TIME else (name,)
+    found = []
+    for k, heading in enumerate(headings):
+        written = _BRACKETS.match(heading) or _ENDING.match(heading)
+        if written is not None and written["name"].strip().lower() in known:
+            own, scale = parsed(heading, where)
+            if own != heading:
+                found.append((k, scale))
+    if len(found) > 1:
+        both = " and ".join(headings[k] for k, _ in found[:2])
+        raise RecorderError(f"{where}: column {name} is there twice: {both[:80]}")
+    return found[0] if found else None
 
 
 def _known(headings: Sequence[str]) -> str:

@@ -16,7 +16,14 @@ from types import MappingProxyType
 import numpy as np
 
 from ir_recorder.errors import RecorderError
-from ir_recorder.traces.columns import Column, TraceMapping, factor, split_unit
+from ir_recorder.traces.columns import (
+    TIMES,
+    Column,
+    TraceMapping,
+    factor,
+    split_unit,
+    without_time,
+)
 from ir_recorder.traces.trace import CURRENT, POWER, TIME, VELOCITY
 from ir_values.arrays import FloatArray
 
@@ -41,9 +48,11 @@ class _Family:
 
 _RTDE = (("actual_qd_{}", VELOCITY, "rad/s"), ("actual_current_{}", CURRENT, "a"))
 _RTDE_POWER = ("actual_robot_voltage", "actual_robot_current")
+_RTDE_CLOCK = ("timestamp", "s")
 _FAMILIES = (
-    _Family("actual_q_{}", 0, "rad", "UR's RTDE", ("timestamp", "s"), _RTDE, _RTDE_POWER),
-    _Family("actual_q{}", 0, "rad", "UR's RTDE", ("timestamp", "s")),
+    _Family("actual_q_{}", 0, "rad", "UR's RTDE", _RTDE_CLOCK, _RTDE, _RTDE_POWER),
+    _Family("actual_q{}", 0, "rad", "UR's RTDE", _RTDE_CLOCK),
+    _Family("actual_q_{}", 1, "rad", "UR's RTDE", _RTDE_CLOCK, _RTDE, _RTDE_POWER),
     *(
         _Family(f"aipos{sign}a{{}}", 1, "deg", "KUKA's RSI", ("ipoc", "ms"))
         for sign in (".", "_", " ", "")
@@ -74,7 +83,6 @@ _FAMILIES = (
         for first in (1, 0)
     ),
 )
-_TIMES = ("time", "zeit", "t", "timestamp")
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,11 +122,17 @@ class MakersColumns:
 
 
 def makers_columns(
-    headings: Sequence[str], joint_names: Sequence[str], where: str, time: Column | None = None
+    headings: Sequence[str],
+    joint_names: Sequence[str],
+    where: str,
+    time: Column | None = None,
+    step: float = math.nan,
 ) -> MakersColumns | None:
-    """The columns of a known family of headings that has all joints; None where there is none.
+    """The columns of a known family of headings that has all joints, or that of the power of UR's
+    RTDE without any; None where there is none.
 
-    time: the column of that name, where there is one.
+    time: the column of that name, where there is one; a maker's own clock comes before it, as logs
+    number their rows so. step [s]: between rows of a file without time; NaN: it has one.
 
     RecorderError for a joint that the robot doesn't have, and for a time without a unit.
     """
@@ -134,10 +148,34 @@ def makers_columns(
         if extra is not None:
             there = ", ".join(joint_names)
             raise RecorderError(f"{where}: {extra} is no joint of the robot, which has {there}")
-        return _columns(family, own, joint_names, places, where, time)
+        return _columns(family, own, joint_names, places, where, _clock(family, places, time, step))
     if nearly:
         raise RecorderError(f"{where}: {nearly}")
-    return None
+    return _metered(places, where)
+
+
+def _clock(
+    family: _Family, places: Mapping[str, str], time: Column | None, step: float
+) -> Column | None:
+    """The column of a file's own name for its time, where it counts; the empty one where rows are a
+    step [s] apart.
+    """
+    if not math.isnan(step):
+        return Column("")
+    own = bool(family.time[0]) and family.time[0] in places
+    return None if own else time
+
+
+def _metered(places: Mapping[str, str], where: str) -> MakersColumns | None:
+    """Time and power of a log of UR's RTDE without joints; None where it has not both."""
+    clock, unit = _RTDE_CLOCK
+    if clock not in places or not set(_RTDE_POWER) <= set(places):
+        return None
+    volts, *others = (_with_unit(places[name], where) for name in _RTDE_POWER)
+    power = replace(volts, others=tuple(others))
+    columns = {TIME: _with_unit(places[clock], where, unit), POWER: power}
+    said = f"{places[clock]} is taken as time, {' times '.join(_RTDE_POWER)} as power"
+    return MakersColumns(TraceMapping(MappingProxyType(columns)), (), (), said)
 
 
 def _missing(family: _Family, found: Sequence[str | None]) -> str:
@@ -161,11 +199,14 @@ def _columns(
     unproved = "" in units
     if unproved and any(units):
         raise RecorderError(f"{where}: only some of {own[0]} .. {own[-1]} have a unit")
-    columns = {TIME: time or _time(family, places, where)}
+    clock = time or _time(family, places, where)
+    columns = {TIME: clock} if clock.heading else {}
     for name, heading, unit in zip(joint_names, own, units, strict=True):
         columns[name] = Column(heading, factor(unit, f"{where}: {heading}") if unit else 1.0)
     columns.update(_further(family, joint_names, places, where))
     said = f"{own[0]} .. {own[-1]} are taken as positions of {joint_names[0]} .. {joint_names[-1]}"
+    if time is None and "time" in places and clock.heading != places["time"]:
+        said += f", {clock.heading} as time, not {places['time']}"
     if family.of and not split_unit(own[0])[1]:
         said += f", in {family.unit} as {family.of} gives them"
     return MakersColumns(
@@ -201,18 +242,9 @@ def _time(family: _Family, places: Mapping[str, str], where: str) -> Column:
     heading, unit = family.time
     if heading in places:
         return _with_unit(places[heading], where, unit)
-    found = next((places[name] for name in _TIMES if name in places), None)
-    if found is None:
-        known = ", ".join(places.values())[:200]
-        raise RecorderError(
-            f"{where}: there is no column time, there is: {known}; a mapping (--mapping) gives the "
-            "step between rows: time: {step: 4, unit: ms}"
-        )
-    if not split_unit(found)[1]:
-        raise RecorderError(
-            f"{where}: column {found} has no unit: write it into the heading, as {found} [s], or "
-            "into a mapping (--mapping)"
-        )
+    found = next((places[name] for name in TIMES if name in places), None)
+    if found is None or not split_unit(found)[1]:
+        raise RecorderError(f"{where}: {without_time(list(places.values()))}")
     return _with_unit(found, where)
 
 

@@ -16,7 +16,14 @@ import numpy as np
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.names import JOINT_NAMES, POWER_STATE
 from ir_recorder.errors import ReadError, RecorderError
-from ir_recorder.reading.cdr import Columns, by_name, fitting, joint_groups, one_robot
+from ir_recorder.reading.cdr import (
+    MOST_JOINTS,
+    Columns,
+    by_name,
+    fitting,
+    joint_groups,
+    one_robot,
+)
 from ir_recorder.reading.reader import TYPES, read_recording
 from ir_recorder.reading.recording import JointSeries, PowerSeries, Recording
 from ir_recorder.traces.columns import TraceMapping, Wanted
@@ -61,12 +68,15 @@ _JOINT_STATES = "joint_states"  # what ROS calls the topic; commands have other 
 _FIELDS = (("position", ""), ("velocity", VELOCITY), ("effort", EFFORT))
 
 
-def read_bag(path: Path) -> Trace:
-    """The joint states of a bag, by their stamps; RecorderError where it has none, or is none."""
+def read_bag(path: Path, mapping: TraceMapping | None = None) -> Trace:
+    """The joint states of a bag, by their stamps: of the mapping's topic, with the names that it
+    gives where they have none. RecorderError where there are none, or it is no bag.
+    """
+    mapping = mapping or TraceMapping()
     os.close(opened(path))  # of a bounded size, and a regular file
     try:
         with sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True) as bag:
-            rows, problems = _messages(bag, path)
+            rows, problems = _messages(bag, path, mapping.topic)
     except sqlite3.Error as error:
         raise RecorderError(f"{path}: can't be read as a bag: {error}") from error
     fit = fitting([data for _, data in rows], JOINT_STATE, _SCHEMA)
@@ -76,8 +86,10 @@ def read_bag(path: Path) -> Trace:
         )
     columns = Columns([rows[k][1] for k in fit], JOINT_STATE, _SCHEMA)
     groups = joint_groups(columns)
+    if list(groups) == [()]:
+        _check_names(path, columns, mapping.joints)
     try:
-        robot = one_robot(groups)
+        robot = [()] if list(groups) == [()] else one_robot(groups)
     except ReadError as error:
         raise RecorderError(f"{path}: {error}") from error
     problems += [
@@ -95,8 +107,12 @@ def read_bag(path: Path) -> Trace:
     kept = np.concatenate([[True], time[1:] > np.maximum.accumulate(time)[:-1]])
     _check_clock(path, time, kept)
     found = {}
-    names = robot[0]
-    fields = by_name(columns, names, *(field for field, _ in _FIELDS))
+    names = robot[0] or mapping.joints
+    paths = [field for field, _ in _FIELDS]
+    if robot[0]:
+        fields = by_name(columns, names, *paths)
+    else:
+        fields = [columns.numbers(path, len(names)) for path in paths]
     for (_, ending), values in zip(_FIELDS, fields, strict=True):
         if np.isfinite(values).any():
             for k, name in enumerate(names):
@@ -116,6 +132,21 @@ def types_of(path: Path) -> frozenset[str]:
         raise RecorderError(f"{path}: can't be read as a bag: {error}") from error
 
 
+def _check_names(path: Path, columns: Columns, joints: Sequence[str]) -> None:
+    """RecorderError where nobody says which joints these states are of, or of another number."""
+    if not joints:
+        raise RecorderError(
+            f"{path}: its joint states name no joint: a mapping (--mapping) gives their names in "
+            "order, as joints: [joint_a1, joint_a2]"
+        )
+    lengths = np.isfinite(columns.numbers("position", MOST_JOINTS)).sum(axis=1)
+    if (lengths != len(joints)).any():
+        other = int(lengths[lengths != len(joints)][0])
+        raise RecorderError(
+            f"{path}: a joint state has {other} positions, the mapping names {len(joints)} joints"
+        )
+
+
 _BACK = 10.0  # usual steps: messages that came late, more is another clock
 
 
@@ -132,9 +163,12 @@ def _check_clock(path: Path, time: FloatArray, kept: FloatArray) -> None:
         )
 
 
-def _messages(bag: sqlite3.Connection, path: Path) -> tuple[list[tuple[int, bytes]], list[str]]:
-    """Times [ns] and bytes of the joint states that are read: of the topic of that name, else of
-    the one with most; and a sentence on what else is in the bag.
+def _messages(
+    bag: sqlite3.Connection, path: Path, wanted: str
+) -> tuple[list[tuple[int, bytes]], list[str]]:
+    """Times [ns] and bytes of the joint states that are read: of the wanted topic, else that of
+    their usual name, else the only one; and a sentence on what else is in the bag. RecorderError
+    where several could be it, as commands are of the same type.
     """
     topics = bag.execute(
         "SELECT t.id, t.name, t.type, COUNT(m.id) FROM topics t JOIN messages m "
@@ -144,6 +178,19 @@ def _messages(bag: sqlite3.Connection, path: Path) -> tuple[list[tuple[int, byte
     if not states:
         raise RecorderError(f"{path}: there are no messages of {JOINT_STATE} in it")
     named = [each for each in states if str(each[1]).rpartition("/")[2] == _JOINT_STATES]
+    if wanted:
+        named = [each for each in states if str(each[1]).strip("/") == wanted.strip("/")]
+    several = [str(each[1])[:100] for each in named or states]
+    if wanted and not named:
+        raise RecorderError(
+            f"{path}: there is no topic {wanted[:100]} of {JOINT_STATE}, there is "
+            f"{listed(several, 8)}"
+        )
+    if len(several) > 1:
+        raise RecorderError(
+            f"{path}: {listed(several, 8)} are all of {JOINT_STATE}, states or commands: a mapping "
+            f"(--mapping) says which to read, as topic: {several[0]}"
+        )
     topic, name, _, count = (named or states)[0]
     if count > _MOST:
         raise RecorderError(f"{path}: has {count} joint states, at most {_MOST} are read")
@@ -151,6 +198,8 @@ def _messages(bag: sqlite3.Connection, path: Path) -> tuple[list[tuple[int, byte
     problems = []
     if others:
         problems.append(f"read is {str(name)[:100]}; topics that are not: {listed(others, 8)}")
+    elif str(name).rpartition("/")[2] != _JOINT_STATES:
+        problems.append(f"read is {str(name)[:100]}, the only topic of {JOINT_STATE}")
     query = "SELECT timestamp, data FROM messages WHERE topic_id = ? ORDER BY timestamp, id"
     return [(int(time), bytes(data)) for time, data in bag.execute(query, (topic,))], problems
 
@@ -261,7 +310,7 @@ def read_traces(
     elif ending in (".egm", ".pb"):
         found = (read_egm(path, joint_names),)
     elif ending == ".db3":
-        found = _of_bag(path)
+        found = _of_bag(path, mapping)
     elif ending == ".mcap":
         found = recorded_traces(read_recording(path))
     else:
@@ -269,11 +318,11 @@ def read_traces(
     return tuple(_shifted(trace, mapping) for trace in found)
 
 
-def _of_bag(path: Path) -> tuple[Trace, ...]:
+def _of_bag(path: Path, mapping: TraceMapping) -> tuple[Trace, ...]:
     """Joints and meter of a bag of this project; of any other the joint states."""
     if POWER_TYPE in types_of(path):
         return recorded_traces(read_recording(path))
-    return (read_bag(path),)
+    return (read_bag(path, mapping),)
 
 
 def _installed(path: Path, ending: str) -> tuple[Trace, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import os
+import re
 import stat
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -19,9 +20,18 @@ from typing import Any, TextIO
 import numpy as np
 
 from ir_recorder.errors import RecorderError
-from ir_recorder.traces.columns import Column, TraceMapping, Wanted, chosen, multiplied, named
+from ir_recorder.traces.columns import (
+    Column,
+    TraceMapping,
+    Wanted,
+    chosen,
+    multiplied,
+    named,
+    other_writing,
+    split_unit,
+)
 from ir_recorder.traces.makers import MakersColumns, makers_columns
-from ir_recorder.traces.trace import LOAD, MODE, TIME, Trace
+from ir_recorder.traces.trace import ENERGY, LOAD, MODE, POWER, TIME, Trace
 from ir_values.arrays import BoolArray, FloatArray, IntArray, number_of
 from ir_values.errors import listed
 
@@ -114,12 +124,15 @@ class _TableReader:
         self._delimiter = max(
             ";\t, ", key=lambda sign: (header.count(sign) > 0, sign != " ", header.count(sign))
         )
+        self._expected = ""
+        self._lengths: list[int] = []  # of the vectors in each column; 0: it has none
         self._headings = [each.strip() for each in next(self._split([header]), [])]
+        self._spread_vectors()
         where = f"{path}:{self._begin}"
-        self._expected = f"the header names {len(self._headings)} columns"
+        self._expected = self._expected or f"the header names {len(self._headings)} columns"
         if _is_row(self._headings):
             self._expected = f"line {self._begin}, the first, has {len(self._headings)}"
-            self._file = chain([header], file)
+            self._file = chain([header], self._file)
             self._begin -= 1
             self._headings = _numbers_of(self._headings, where, mapping)
         self._maker = _maker_of(self._headings, where, wanted, mapping, joint_names)
@@ -127,8 +140,42 @@ class _TableReader:
         self._places = chosen(self._headings, where, wanted, self._mapping)
 
     def _split(self, lines: Iterable[str]) -> Iterator[list[str]]:
-        """Rows of cells; several spaces separate as one does."""
-        return csv.reader(lines, delimiter=self._delimiter, skipinitialspace=self._delimiter == " ")
+        """Rows of cells; several spaces separate as one does, vectors in one cell have one each."""
+        rows = csv.reader(lines, delimiter=self._delimiter, skipinitialspace=self._delimiter == " ")
+        return map(self._spread, rows) if any(self._lengths) else rows
+
+    def _spread_vectors(self) -> None:
+        """Headings of their own for the entries of vectors that stand in one cell, as
+        "[1.0, 2.0]"; the first row says how many they are.
+        """
+        first = list(islice(self._file, 1))
+        self._file = chain(first, self._file)
+        cells = next(self._split(first), [])
+        if len(cells) != len(self._headings):
+            return
+        lengths = [len(_entries(cell)) for cell in cells]
+        if not any(lengths):
+            return
+        self._lengths = lengths
+        headings = []
+        for heading, length in zip(self._headings, lengths, strict=True):
+            name, unit = split_unit(heading)
+            ending = f" [{unit}]" if unit else ""
+            headings += [f"{name}_{k}{ending}" for k in range(length)] or [heading]
+        self._headings = headings
+        self._expected = f"the header and the first row name {len(headings)} columns"
+
+    def _spread(self, row: list[str]) -> list[str]:
+        """A row with one cell for each entry of its vectors."""
+        if len(row) != len(self._lengths):
+            return row
+        cells: list[str] = []
+        for cell, length in zip(row, self._lengths, strict=True):
+            if length:
+                cells += _entries(cell) or [""] * length
+            else:
+                cells.append(cell)
+        return cells
 
     def _header(self) -> str:
         for line in self._file:
@@ -201,7 +248,7 @@ class _TableReader:
         NumPy's parser; None where anything else is in them.
         """
         between = len(self._headings) - 1
-        if any(line.count(self._delimiter) != between for line in block):
+        if any(self._lengths) or any(line.count(self._delimiter) != between for line in block):
             return None
         places = [self._places[name][0] for name in names]
         try:
@@ -262,6 +309,16 @@ class _TableReader:
             )
 
 
+_VECTOR = re.compile(r"\s*[\[(](.*)[\])]\s*", re.DOTALL)
+_BETWEEN = re.compile(r"[\s,;]+")
+
+
+def _entries(cell: str) -> list[str]:
+    """Entries of a vector in brackets; none where a cell is no vector."""
+    found = _VECTOR.fullmatch(cell)
+    return [] if found is None else [each for each in _BETWEEN.split(found[1]) if each]
+
+
 def _is_row(cells: Sequence[str]) -> bool:
     """Whether a first line is no line of headings: every cell is a number."""
     try:
@@ -299,7 +356,8 @@ def _maker_of(
     if any(name in joint_names for name, _ in plain.values()):
         return None
     times = [Column(heading, scale) for heading, (name, scale) in plain.items() if name == TIME]
-    found = makers_columns(headings, joint_names, where, times[0] if times else None)
+    time = times[0] if times else None
+    found = makers_columns(headings, joint_names, where, time, mapping.step)
     if found is None:
         return None
     beside = {
@@ -307,6 +365,10 @@ def _maker_of(
         for heading, (name, scale) in plain.items()
         if name != TIME and wanted(name)
     }
+    for name in (POWER, ENERGY):
+        other = other_writing(headings, where, name) if name not in beside else None
+        if other is not None:
+            beside[name] = Column(headings[other[0]], other[1])
     columns = MappingProxyType({**found.mapping.columns, **beside})
     return replace(found, mapping=replace(mapping, columns=columns))
 
