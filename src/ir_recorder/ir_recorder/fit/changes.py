@@ -18,7 +18,7 @@ import numpy as np
 from ir_description import Load
 from ir_recorder.fit.channels import FRICTION, WINDOW, FittedRun, by_window
 from ir_recorder.fit.power_estimate import Estimate, rests, safe
-from ir_recorder.measure.power_model import Prepared
+from ir_recorder.measure.power_model import PowerModel, Prepared
 from ir_values.arrays import FloatArray, IntArray
 
 # Kinds of changes, and how each enters the prediction.
@@ -146,47 +146,48 @@ class Explained:
         return float(rows @ np.log(before.noise / self.noise) + 0.5 * (before.pulled - self.pulled))
 
 
-class Opened(Estimate):
-    """A fit with these parameters beside its own; `solve` and `rows` take and give all of them."""
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """A fit with these parameters beside its own, and a change of its recordings or none; all of
+    them (P + E + ..,) have deviations `wide`, values `before` the fit, and bounds `low`, `high`.
+    units: Nm (M, n) of each recording that a kilogram before the flange asks of the motors.
+    """
 
-    def __init__(self, estimate: Estimate, change: Change | None = None) -> None:
-        vars(self).update(vars(estimate))
-        self._change = change
-        self._count = len(estimate.found)
-        moving = float(estimate.model.robot.link_mass[1:].sum())
-        self._kg = _KG * moving
-        self._units = [self._unit(run) for run in self.runs]
-        wide = [_OPEN_MASS * moving]
-        if self.meter is not None:
-            wide.append(_OPEN_LATE)
-        if change is not None:
-            wide.append(_OPEN_SIZE.get(change.kind, wide[0]))
-        usual = estimate.wide.copy()
-        for term in FRICTION:
-            places = estimate.prior.places(term)
-            usual[places] = np.maximum(usual[places], _OPEN_FRICTION * estimate.deviation[places])
-        self.wide = np.concatenate([usual, wide])
-        self._pull = np.diag(1.0 / safe(self.wide))
-        self._before = np.concatenate([self._before, np.zeros(len(wide))])
-        self._low = np.concatenate([self._low, np.full(len(wide), -np.inf)])
-        self._high = np.concatenate([self._high, np.full(len(wide), np.inf)])
-        self._free = self.wide > 0.0
+    estimate: Estimate
+    wide: FloatArray
+    before: FloatArray
+    low: FloatArray
+    high: FloatArray
+    units: tuple[FloatArray, ...]
+    change: Change | None = None
 
-    def _unit(self, run: FittedRun) -> FloatArray:
-        """Nm (M, n) that a kilogram before the flange asks of the motors."""
-        robot = self.model.robot
-        out = 0.5 * float(np.linalg.norm(robot.joint_origin[-1][:3, 3]))
-        size = max(out, 0.01) ** 2 * np.eye(3)
-        held = Load("more", "tool", 1.0, np.array([out, 0.0, 0.0]), size)
-        loads = tuple((*each, held) for each in run.samples.loads)
-        more = self.model.prepare(replace(run.samples, loads=loads))
-        return np.asarray(more.torques.loads - run.prepared.torques.loads)
+    def with_change(self, change: Change) -> Opened:
+        """The same with a change, the size of which is one more parameter."""
+        if self.change is not None:
+            return replace(self, change=change)
+        return replace(
+            self,
+            wide=np.append(self.wide, _OPEN_SIZE.get(change.kind, self.wide[self._count])),
+            before=np.append(self.before, 0.0),
+            low=np.append(self.low, -np.inf),
+            high=np.append(self.high, np.inf),
+            change=change,
+        )
+
+    @property
+    def _count(self) -> int:
+        """Parameters of the fit itself."""
+        return len(self.estimate.found)
+
+    @property
+    def _kg(self) -> float:
+        return _KG * _moving_mass(self.estimate)
 
     def fitted(self, start: FloatArray) -> FloatArray:
         """The best parameters from a start."""
-        begin = np.clip(start, self._low, self._high)
+        begin = np.clip(start, self.low, self.high)
         x = begin
-        for softness in _SOFTNESS if self.meter is not None else ():
+        for softness in _SOFTNESS if self.estimate.meter is not None else ():
             x = self._descended(x, softness)
         if self.explained(x).likelihood < self.explained(begin).likelihood:
             x = begin  # kinks of the DC link
@@ -195,18 +196,18 @@ class Opened(Estimate):
     def explained(self, x: FloatArray) -> Explained:
         """What parameters leave."""
         noise, correlated = self._noise(x)
-        rows = np.bincount(self._group, minlength=len(noise))
+        rows = np.bincount(self.estimate.group, minlength=len(noise))
         return Explained(noise, correlated, rows, self._cost(x, np.zeros(0)))
 
     def _descended(self, x: FloatArray, softness: float) -> FloatArray:
         """Steps of Gauss and Newton, until they gain little."""
         missing = self.missing(x, softness)
         for _ in range(_ROUNDS):
-            weight = 1.0 / self.noise_of(missing)[0][self._group]
+            weight = 1.0 / self.estimate.noise_of(missing)[0][self.estimate.group]
             cost = self._cost(x, weight * missing)
             step = self._bounded(x, weight, missing, self.rows(x, softness)[1])
             for share in _SHARES:
-                trial = np.clip(x + share * step, self._low, self._high)
+                trial = np.clip(x + share * step, self.low, self.high)
                 left = self.missing(trial, softness)
                 gained = cost - self._cost(trial, weight * left)
                 if gained > 0.0:
@@ -220,7 +221,7 @@ class Opened(Estimate):
         return x
 
     def _cost(self, x: FloatArray, missing: FloatArray) -> float:
-        pulled = (x - self._before) / safe(self.wide)
+        pulled = (x - self.before) / safe(self.wide)
         return float(missing @ missing + pulled @ pulled)
 
     def _bounded(
@@ -229,13 +230,13 @@ class Opened(Estimate):
         """The step of least cost; what would leave its bounds goes to them, the rest once more."""
         free = self.wide > 0.0
         step = np.zeros(len(x))
-        target = np.concatenate([weight * missing, (self._before - x) / safe(self.wide)])
+        target = np.concatenate([weight * missing, (self.before - x) / safe(self.wide)])
         matrix = np.vstack([weight[:, None] * slopes * self.wide, np.eye(len(x))])
         triangle = np.asarray(np.linalg.qr(np.column_stack([matrix, target]), mode="r"))
         for _ in range(_BOUNDED):
             own = triangle[:, -1] - triangle[:, :-1] @ (step / safe(self.wide))
             step[free] += self.wide[free] * np.linalg.lstsq(triangle[:, :-1][:, free], own)[0]
-            inside = np.clip(x + step, self._low, self._high) - x
+            inside = np.clip(x + step, self.low, self.high) - x
             beyond = free & (np.abs(inside - step) > 1e-9 * self.wide)
             step = inside
             if not beyond.any():
@@ -245,14 +246,14 @@ class Opened(Estimate):
 
     def weights(self, x: FloatArray) -> FloatArray:
         """Weights (R,) of the rows by what they miss."""
-        return np.asarray(1.0 / self._noise(x)[0][self._group])
+        return np.asarray(1.0 / self._noise(x)[0][self.estimate.group])
 
     def _noise(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return self.noise_of(self.missing(x))
+        return self.estimate.noise_of(self.missing(x))
 
     def with_more(self, x: FloatArray) -> FloatArray:
         """Parameters of the fit with nothing more."""
-        return np.concatenate([x, np.zeros(len(self._before) - len(x))])
+        return np.concatenate([x, np.zeros(len(self.before) - len(x))])
 
     def with_lateness(self, x: FloatArray, late: float) -> FloatArray:
         """The same with a meter that is late [s]."""
@@ -263,20 +264,15 @@ class Opened(Estimate):
     def shown_later(self, x: FloatArray, late: float) -> FloatArray:
         """Watts (R,) that a meter which is late [s] shows."""
         missing = self.missing(self.with_lateness(x, late))
-        return np.asarray((self._measured - missing)[: self._metered])
-
-    def explained_by(self, change: Change, x: FloatArray) -> Explained:
-        """What they leave with a change at another instant."""
-        self._change = change
-        return self.explained(x)
+        return np.asarray((self.estimate.measured - missing)[: self._metered])
 
     def times(self) -> tuple[IntArray, FloatArray]:
         """Which recording each row (R,) is of, and when [s] on its clock."""
         place = np.concatenate(
-            [np.full(len(run.samples) // WINDOW, k) for k, run in enumerate(self.runs)]
+            [np.full(len(run.samples) // WINDOW, k) for k, run in enumerate(self.estimate.runs)]
         )
-        time = np.concatenate([by_window(run.samples.time) for run in self.runs])
-        return place[self.window], time[self.window]
+        time = np.concatenate([by_window(run.samples.time) for run in self.estimate.runs])
+        return place[self.estimate.window], time[self.estimate.window]
 
     def slope_of(self, kind: str, x: FloatArray, slopes: FloatArray) -> FloatArray:
         """How the rows (R,) change with a change of a kind that holds all the time."""
@@ -285,53 +281,50 @@ class Opened(Estimate):
         if kind == CLOCK:
             return slopes[:, self._count + 1]
         if kind == FRICTION_FELL:
-            places = self.prior.places("viscous")
+            places = self.estimate.prior.places("viscous")
             return np.asarray(slopes[:, places] @ x[places])
         return (np.arange(len(slopes)) < self._metered).astype(float)
 
     @property
-    def before(self) -> FloatArray:
-        """Values of all parameters before the fit."""
-        return self._before
-
-    @property
     def _metered(self) -> int:
-        return 0 if self.meter is None else len(self.meter.measured)
+        return 0 if self.estimate.meter is None else len(self.estimate.meter.measured)
 
     def rows(self, x: FloatArray, softness: float = 0.0) -> tuple[FloatArray, FloatArray]:
         """What the rows miss (R,), and the slopes (R, ...) of what is predicted."""
-        asked = [self._asked(k, x) for k in range(len(self.runs))]
+        asked = [self._asked(k, x) for k in range(len(self.estimate.runs))]
         parts = []
-        if self.meter is not None:
+        if self.estimate.meter is not None:
             parts.append(self._watts_and_slopes(x, asked, softness))
-        if self.motors is not None:
+        if self.estimate.motors is not None:
             parts.append(self._efforts(x, asked))
         predicted = np.concatenate([each for each, _ in parts])
-        return self._measured - predicted, np.concatenate([each for _, each in parts])
+        return self.estimate.measured - predicted, np.concatenate([each for _, each in parts])
 
     def missing(self, x: FloatArray, softness: float = 0.0) -> FloatArray:
         """What the rows miss (R,)."""
-        asked = [self._asked(k, x) for k in range(len(self.runs))]
+        asked = [self._asked(k, x) for k in range(len(self.estimate.runs))]
         parts = []
-        if self.meter is not None:
-            mean = x[: len(self.prior.names)]
+        if self.estimate.meter is not None:
+            mean = x[: len(self.estimate.prior.names)]
             shown = []
-            for k, (run, (more, _, shape)) in enumerate(zip(self.runs, asked, strict=True)):
+            for k, (run, (more, _, shape)) in enumerate(
+                zip(self.estimate.runs, asked, strict=True)
+            ):
                 asked_for = self._with_more(run.prepared, mean, more)
-                watts = self.model.watts(mean, asked_for, softness)
+                watts = self.estimate.model.watts(mean, asked_for, softness)
                 shown.append(self._shown(k, x, run.samples.metered(watts), shape))
-            parts.append(self.meter.reduced(shown))
-        if self.motors is not None:
+            parts.append(self.estimate.meter.reduced(shown))
+        if self.estimate.motors is not None:
             parts.append(self._efforts(x, asked)[0])
-        return np.asarray(self._measured - np.concatenate(parts))
+        return np.asarray(self.estimate.measured - np.concatenate(parts))
 
     def _shown(self, k: int, x: FloatArray, watts: FloatArray, shape: FloatArray) -> FloatArray:
         """What a late meter shows of watts (M,), with a change of the watts."""
-        kind = "" if self._change is None else self._change.kind
+        kind = "" if self.change is None else self.change.kind
         late = np.full(len(watts), x[self._count + 1])
         if kind == CLOCK:
             late += x[-1] * shape
-        time = self.runs[k].samples.time
+        time = self.estimate.runs[k].samples.time
         shown = np.interp(time - late, time, watts)
         return np.asarray(shown + x[-1] * shape if kind == WATTS else shown)
 
@@ -339,17 +332,17 @@ class Opened(Estimate):
         """What is asked of the motors of a recording beyond the loads [Nm] (M, n), what a unit of
         the change asks of them, and its shape (M,).
         """
-        run = self.runs[k]
+        run = self.estimate.runs[k]
         shape = np.zeros(len(run.samples))
         per = np.zeros_like(run.prepared.speed)
-        more = x[self._count] * self._units[k]
-        if self._change is None or self._change.number != k:
+        more = x[self._count] * self.units[k]
+        if self.change is None or self.change.number != k:
             return more, per, shape
-        shape = self._change.shape(run.samples.time)
-        if self._change.kind == PAYLOAD:
-            per = shape[:, None] * self._units[k]
-        elif self._change.kind == FRICTION_FELL:
-            viscous = x[self.prior.places("viscous")]
+        shape = self.change.shape(run.samples.time)
+        if self.change.kind == PAYLOAD:
+            per = shape[:, None] * self.units[k]
+        elif self.change.kind == FRICTION_FELL:
+            viscous = x[self.estimate.prior.places("viscous")]
             per = shape[:, None] * viscous * run.prepared.speed
         return more + x[-1] * per, per, shape
 
@@ -359,22 +352,22 @@ class Opened(Estimate):
         asked: Sequence[tuple[FloatArray, FloatArray, FloatArray]],
         softness: float,
     ) -> tuple[FloatArray, FloatArray]:
-        assert self.meter is not None  # asked before
-        mean = x[: len(self.prior.names)]
-        kind = "" if self._change is None else self._change.kind
+        assert self.estimate.meter is not None  # asked before
+        mean = x[: len(self.estimate.prior.names)]
+        kind = "" if self.change is None else self.change.kind
         watts = []
         slopes = []
-        for k, (run, (more, per, shape)) in enumerate(zip(self.runs, asked, strict=True)):
+        for k, (run, (more, per, shape)) in enumerate(zip(self.estimate.runs, asked, strict=True)):
             with_more = partial(self._with_more, run.prepared, mean)
             asked_for = with_more(more)
-            power, own = self.model.watts_and_slopes(mean, asked_for, softness)
-            heavier = with_more(more + self._kg * self._units[k])
-            by_mass = (self.model.watts(mean, heavier, softness) - power) / self._kg
+            power, own = self.estimate.model.watts_and_slopes(mean, asked_for, softness)
+            heavier = with_more(more + self._kg * self.units[k])
+            by_mass = (self.estimate.model.watts(mean, heavier, softness) - power) / self._kg
             by_change = np.zeros(len(power))
             if kind in _TORQUES:
                 step = self._kg if kind == PAYLOAD else _SHARE
                 raised = with_more(more + step * per)
-                by_change = (self.model.watts(mean, raised, softness) - power) / step
+                by_change = (self.estimate.model.watts(mean, raised, softness) - power) / step
             columns = run.samples.metered(np.column_stack([power, own, by_mass, by_change]))
             rate = -np.gradient(columns[:, 0], run.samples.step)
             if kind == CLOCK:
@@ -385,32 +378,68 @@ class Opened(Estimate):
             wider = [columns[:, 1:-2], none, columns[:, -2:-1], rate[:, None]]
             watts.append(self._shown(k, x, columns[:, 0], shape))
             slopes.append(np.hstack([*wider, columns[:, -1:]] if kind else wider))
-        return self.meter.reduced(watts), self.meter.reduced(slopes)
+        return self.estimate.meter.reduced(watts), self.estimate.meter.reduced(slopes)
 
     def _with_more(self, prepared: Prepared, mean: FloatArray, more: FloatArray) -> Prepared:
         """With more (M, n) Nm asked of the motors, whatever the factor of the loads."""
-        factor = float(mean[self.prior.index("load_mass")])
+        factor = float(mean[self.estimate.prior.index("load_mass")])
         loads = prepared.torques.loads + more / factor
         return replace(prepared, torques=replace(prepared.torques, loads=loads))
 
     def _efforts(
         self, x: FloatArray, asked: Sequence[tuple[FloatArray, FloatArray, FloatArray]]
     ) -> tuple[FloatArray, FloatArray]:
-        assert self.motors is not None  # asked before
-        n = self.motors.n
+        assert self.estimate.motors is not None  # asked before
+        n = self.estimate.motors.n
         scale = x[self._count - n : self._count]
-        efforts, slopes = self.motors.predicted(x[: self._count], 0.0)
-        more = self.motors.reduced([each for each, _, _ in asked])
-        tail = [self.motors.reduced(self._units)]
-        if self.meter is not None:
+        efforts, slopes = self.estimate.motors.predicted(x[: self._count], 0.0)
+        more = self.estimate.motors.reduced([each for each, _, _ in asked])
+        tail = [self.estimate.motors.reduced(self.units)]
+        if self.estimate.meter is not None:
             tail.append(np.zeros_like(more))
-        if self._change is not None:
-            tail.append(self.motors.reduced([each for _, each, _ in asked]))
+        if self.change is not None:
+            tail.append(self.estimate.motors.reduced([each for _, each, _ in asked]))
         rows = len(more)
         for j in range(n):
             slopes[j * rows : (j + 1) * rows, self._count - n + j] += more[:, j]
         wider = np.column_stack([(scale * each).T.ravel() for each in tail])
         return efforts + (scale * more).T.ravel(), np.hstack([slopes, wider])
+
+
+def opened(estimate: Estimate) -> Opened:
+    """A fit with these parameters beside its own, and no change."""
+    wide = [_OPEN_MASS * _moving_mass(estimate)]
+    if estimate.meter is not None:
+        wide.append(_OPEN_LATE)
+    usual = estimate.wide.copy()
+    for term in FRICTION:
+        places = estimate.prior.places(term)
+        usual[places] = np.maximum(usual[places], _OPEN_FRICTION * estimate.deviation[places])
+    more = len(wide)
+    return Opened(
+        estimate,
+        np.concatenate([usual, wide]),
+        np.concatenate([estimate.before, np.zeros(more)]),
+        np.concatenate([estimate.low, np.full(more, -np.inf)]),
+        np.concatenate([estimate.high, np.full(more, np.inf)]),
+        tuple(_unit(estimate.model, run) for run in estimate.runs),
+    )
+
+
+def _moving_mass(estimate: Estimate) -> float:
+    """Kilograms of the moving links."""
+    return float(estimate.model.robot.link_mass[1:].sum())
+
+
+def _unit(model: PowerModel, run: FittedRun) -> FloatArray:
+    """Nm (M, n) that a kilogram before the flange asks of the motors."""
+    robot = model.robot
+    out = 0.5 * float(np.linalg.norm(robot.joint_origin[-1][:3, 3]))
+    size = max(out, 0.01) ** 2 * np.eye(3)
+    held = Load("more", "tool", 1.0, np.array([out, 0.0, 0.0]), size)
+    loads = tuple((*each, held) for each in run.samples.loads)
+    more = model.prepare(replace(run.samples, loads=loads))
+    return np.asarray(more.torques.loads - run.prepared.torques.loads)
 
 
 # Where a change would explain most, to first order: every instant of a raster is tried.
@@ -426,14 +455,14 @@ _FIRST = 0.02  # of the squares: to first order, at least
 _SEEN = 1e-3  # of a change: what is left beside all other parameters, at least
 
 
-def _candidates(kind: str, opened: Opened) -> Iterator[Change]:
-    for number, run in enumerate(opened.runs):
+def _candidates(kind: str, usual: Opened) -> Iterator[Change]:
+    for number, run in enumerate(usual.estimate.runs):
         time = run.samples.time
         at = partial(Change, run.name, kind, number=number)
         raster = max(_RASTER, (time[-1] - time[0]) / _INSTANTS)
         for start in np.arange(time[0] + _NEAR_END, time[-1] - _NEAR_END, raster).tolist():
             yield at(start)
-        if len(opened.runs) > 1:
+        if len(usual.estimate.runs) > 1:
             yield at(float(time[0]))
         if kind == FRICTION_FELL:
             for share in _FADES:
@@ -456,24 +485,24 @@ def _within(at: Callable[..., Change], first: float, last: float) -> Iterator[Ch
                 yield at(start, end)
 
 
-def _likeliest(kind: str, opened: Opened, x: FloatArray) -> list[Change]:
+def _likeliest(kind: str, usual: Opened, x: FloatArray) -> list[Change]:
     """The changes of a kind that explain most to first order: of a payload, which first order tells
     least well, the best of each part of the recordings; none where that is little.
     """
-    missing, slopes = opened.rows(x)
-    weight = opened.weights(x)
-    free = opened.wide > 0.0
-    own = weight[:, None] * slopes[:, free] * opened.wide[free]
+    missing, slopes = usual.rows(x)
+    weight = usual.weights(x)
+    free = usual.wide > 0.0
+    own = weight[:, None] * slopes[:, free] * usual.wide[free]
     basis = np.linalg.qr(np.vstack([own, np.eye(own.shape[1])]))[0]
-    pulled = ((opened.before - x) / safe(opened.wide))[free]
+    pulled = ((usual.before - x) / safe(usual.wide))[free]
     target = np.concatenate([weight * missing, pulled])
     left = target - basis @ (basis.T @ target)
     rows = len(missing)
-    along = weight * opened.slope_of(kind, x, slopes)
-    places, times = opened.times()
+    along = weight * usual.slope_of(kind, x, slopes)
+    places, times = usual.times()
     least = _FIRST * rows
     best: dict[int, tuple[float, Change]] = {}
-    candidates = list(_candidates(kind, opened))
+    candidates = list(_candidates(kind, usual))
     parts = _PARTS if kind == PAYLOAD else 1
     for k, each in enumerate(candidates):
         inside = places == each.number
@@ -497,19 +526,19 @@ _LAGS = np.arange(-1.0, 1.01, 0.05)  # s
 _NEARER = 0.9  # of the squares that one lateness leaves
 
 
-def _moved_clock(opened: Opened, x: FloatArray) -> tuple[Change, FloatArray] | None:
+def _moved_clock(usual: Opened, x: FloatArray) -> tuple[Change, FloatArray] | None:
     """The step of the meter's clock that leaves least, and where a fit with it begins: at the
     parameters that were found or, as a fit to a clock that moved explains little, at those known
     before.
     """
-    assert opened.meter is not None  # asked before
-    places, times = opened.times()
-    places = places[: len(opened.meter.measured)]
+    assert usual.estimate.meter is not None  # asked before
+    places, times = usual.times()
+    places = places[: len(usual.estimate.meter.measured)]
     times = times[: len(places)]
     found = []
-    for begin in (x, opened.before):
-        shown = np.array([opened.shown_later(begin, lag) for lag in _LAGS])
-        for k, run in enumerate(opened.runs):
+    for begin in (x, usual.before):
+        shown = np.array([usual.shown_later(begin, lag) for lag in _LAGS])
+        for k, run in enumerate(usual.estimate.runs):
             at = times[places == k]
             inside = np.flatnonzero(
                 (at > at.min(initial=np.inf) + _NEAR_END)
@@ -517,7 +546,7 @@ def _moved_clock(opened: Opened, x: FloatArray) -> tuple[Change, FloatArray] | N
             )
             if not len(inside):
                 continue
-            measured = opened.meter.measured[places == k]
+            measured = usual.estimate.meter.measured[places == k]
             both = [_unlike(measured, each, inside) for each in shown[:, places == k]]
             before, behind = (np.array(each) for each in zip(*both, strict=True))
             least = before.min(axis=0) + behind.min(axis=0)
@@ -528,7 +557,7 @@ def _moved_clock(opened: Opened, x: FloatArray) -> tuple[Change, FloatArray] | N
             first, then = (_LAGS[each[:, best].argmin()] for each in (before, behind))
             instant = float(at[inside[best]])
             change = Change(run.name, CLOCK, instant, size=float(then - first), number=k)
-            late = opened.with_lateness(begin, first)
+            late = usual.with_lateness(begin, first)
             found.append((float(least[best]), change, late))
     if not found:
         return None
@@ -580,8 +609,7 @@ def change(estimate: Estimate) -> Change | None:
     first = found[0]
     if first.likelier < _BY_ROW * _smaller(estimate, first):
         return None
-    moving = float(estimate.model.robot.link_mass[1:].sum())
-    if first.kind == PAYLOAD and abs(first.size) < _LEAST_MASS * moving:
+    if first.kind == PAYLOAD and abs(first.size) < _LEAST_MASS * _moving_mass(estimate):
         return None
     others = {each.kind for each in found if each.likelier > _NEARLY * first.likelier}
     return replace(first, others=tuple(sorted(others - {first.kind})))
@@ -599,7 +627,7 @@ def _smaller(estimate: Estimate, change: Change) -> int:
 
 def changes(estimate: Estimate) -> list[Change]:
     """The likeliest changes of each kind, the likeliest first."""
-    usual = Opened(estimate)
+    usual = opened(estimate)
     x = usual.fitted(usual.with_more(estimate.found))
     starts = []
     for kind in _KINDS if estimate.meter is not None else _TORQUES:
@@ -608,11 +636,11 @@ def changes(estimate: Estimate) -> list[Change]:
     moved = None if estimate.meter is None else _moved_clock(usual, x)
     if moved is not None:
         starts.append((moved[0], np.append(moved[1], moved[0].size)))
-    tried = [_Tried.fitted(estimate, each, begin) for each, begin in starts]
+    tried = [_Tried.fitted(usual, each, begin) for each, begin in starts]
     tried.sort(key=lambda each: -each.after.likelihood)
     least = usual.explained(x).likelihood + min(_LIKELIER.values())
     tried[:_INSTANTS_OF] = [
-        each.at_its_instant(estimate) if each.after.likelihood > least else each
+        each.at_its_instant(usual) if each.after.likelihood > least else each
         for each in tried[:_INSTANTS_OF]
     ]
     before = _best(usual, x, tried)
@@ -629,32 +657,31 @@ class _Tried:
     after: Explained
 
     @classmethod
-    def fitted(cls, estimate: Estimate, change: Change, begin: FloatArray) -> _Tried:
+    def fitted(cls, usual: Opened, change: Change, begin: FloatArray) -> _Tried:
         """A fit with a change, from a start."""
-        opened = Opened(estimate, change)
-        x = opened.fitted(begin)
-        return cls(replace(change, size=float(x[-1])), x, opened.explained(x))
+        changed = usual.with_change(change)
+        x = changed.fitted(begin)
+        return cls(replace(change, size=float(x[-1])), x, changed.explained(x))
 
-    def at_its_instant(self, estimate: Estimate) -> _Tried:
+    def at_its_instant(self, usual: Opened) -> _Tried:
         """The same where it explains most with the parameters that it leads to."""
         best = self
         for _ in range(_INSTANTS_AGAIN):
-            opened = Opened(estimate, best.change)
             other = best.change
             for edge in ("start", "end") if np.isfinite(other.end) else ("start",):
-                steps = _moved(other, edge, opened)
-                left = [opened.explained_by(each, best.x).likelihood for each in steps]
+                steps = _moved(other, edge, usual)
+                left = [usual.with_change(each).explained(best.x).likelihood for each in steps]
                 other = steps[int(np.argmax(left))]
             if other == best.change:
                 break
-            again = _Tried.fitted(estimate, other, best.x)
+            again = _Tried.fitted(usual, other, best.x)
             if again.after.likelihood <= best.after.likelihood:
                 break
             best = again
         return best
 
 
-def _moved(change: Change, edge: str, opened: Opened) -> list[Change]:
+def _moved(change: Change, edge: str, usual: Opened) -> list[Change]:
     """The same change at other instants: within a rest nearby, else anywhere; first as it is."""
     if np.isfinite(change.end):
         near = _NEAR * np.arange(-_STEPS, _STEPS + 1)
@@ -662,7 +689,7 @@ def _moved(change: Change, edge: str, opened: Opened) -> list[Change]:
         return [change, *(each for each in others if each.end - each.start > _NEAR)]
     if np.isfinite(change.fading):
         return [change]
-    every = (each for each in _candidates(change.kind, opened) if each.lasts)
+    every = (each for each in _candidates(change.kind, usual) if each.lasts)
     return [
         change,
         *(replace(change, run=each.run, number=each.number, start=each.start) for each in every),

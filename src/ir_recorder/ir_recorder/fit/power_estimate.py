@@ -262,7 +262,11 @@ def fit(
 
 
 class Estimate:
-    """A fit at work: its recordings and channels, and the parameters of any part of them."""
+    """A fit at work: its recordings and channels, and the parameters of any part of them.
+
+    measured, window, group (R,): what each row shows, the number of its window, whose noise it
+    shares. before, low, high (P + E,): parameters before the fit, and their physical bounds.
+    """
 
     def __init__(
         self,
@@ -287,17 +291,17 @@ class Estimate:
         own = (np.zeros(0), np.zeros(0))
         if self.motors is not None:
             own = self.motors.own_prior(self.prior.mean)
-        self._before = np.concatenate([self.prior.mean, own[0]])
-        self.found = self._before  # as far as the fit is
+        self.before = np.concatenate([self.prior.mean, own[0]])
+        self.found = self.before  # as far as the fit is
         self.deviation = np.concatenate([self.prior.deviation, own[1]])
         low, high = physical_bounds(prior.names)
-        self._low = np.concatenate([low, np.full(extra, -np.inf)])
-        self._high = np.concatenate([high, np.full(extra, np.inf)])
-        self._measured = np.concatenate([each.measured for each in self._channels])
+        self.low = np.concatenate([low, np.full(extra, -np.inf)])
+        self.high = np.concatenate([high, np.full(extra, np.inf)])
+        self.measured = np.concatenate([each.measured for each in self._channels])
         self.window = np.concatenate([each.window for each in self._channels])
         firsts = np.cumsum([0, *(len(each.least) for each in self._channels)])
         groups = zip(self._channels, firsts[:-1], strict=True)
-        self._group = np.concatenate([each.group + first for each, first in groups])
+        self.group = np.concatenate([each.group + first for each, first in groups])
         self._least = np.concatenate([each.least for each in self._channels])
         self._friction_scale = 1.0
         self._set_pull()
@@ -315,13 +319,13 @@ class Estimate:
     def _set_pull(self) -> None:
         """What whitens the parameters, (P + E, P + E), with friction as wide as its scale says."""
         count = len(self.prior.names)
-        wide = np.ones(len(self._before))
+        wide = np.ones(len(self.before))
         for term in FRICTION:
             wide[self.prior.places(term)] = self._friction_scale
         values, vectors = np.linalg.eigh(scaled(self.prior))
         if values.min() <= 1e-9:
             raise RecorderError("the covariance of the prior is singular")
-        root = np.eye(len(self._before))
+        root = np.eye(len(self.before))
         root[:count, :count] = (vectors / np.sqrt(values)).T
         self.wide = self.deviation * wide
         self._pull = root / safe(self.wide)
@@ -331,8 +335,8 @@ class Estimate:
         """Both noises and the parameters in turn, then with the noise that explains what was left
         out; what is said of their uncertainty explains what these parameters leave.
         """
-        weight = 1.0 / self._first_noise()[self._group]
-        x = self._before.copy()
+        weight = 1.0 / self._first_noise()[self.group]
+        x = self.before.copy()
         for softness in SOFTNESS if self.meter is not None else ():
             x, _ = self.solve(x, weight, self._free, softness)
         x, weight, noise = self._reweighted(x, weight)
@@ -459,7 +463,7 @@ class Estimate:
             noise, correlated = self._noise(x)
             if self.meter is None:  # all axes alike: what an axis lacks is bias, not noise
                 correlated = np.ones(len(noise))
-            weight = 1.0 / (noise * np.sqrt(correlated))[self._group]
+            weight = 1.0 / (noise * np.sqrt(correlated))[self.group]
         return x, weight, noise
 
     def solve(
@@ -468,12 +472,12 @@ class Estimate:
         """The parameters of least cost with those that are not free as in the prior; and the
         precision. weight (R,): of the rows, 0 for those that are left out.
         """
-        x = np.where(free, start, self._before)
+        x = np.where(free, start, self.before)
         cost, residual, slopes = self._at(x, weight, softness)
         for _ in range(_ROUNDS):
             step = self._step(x, residual, slopes, free)
             for share in _SHARES:
-                trial = np.clip(x + share * step, self._low, self._high)
+                trial = np.clip(x + share * step, self.low, self.high)
                 better = self._at(trial, weight, softness)
                 if better[0] <= cost:
                     break
@@ -501,7 +505,7 @@ class Estimate:
         scale = safe(self.wide)
         weighted = self.weight[:, None] * np.hstack([slopes * scale, late])
         pull = np.hstack([self._pull * scale, np.zeros((len(scale), len(self.runs)))])
-        target = [self.weight * missing, self._pull @ (self._before - self.found)]
+        target = [self.weight * missing, self._pull @ (self.before - self.found)]
         solved = np.linalg.lstsq(
             np.concatenate([weighted, pull]), np.concatenate(target), rcond=None
         )
@@ -532,7 +536,7 @@ class Estimate:
         """
         self.wide = wide
         self._pull = np.diag(1.0 / safe(wide))
-        inside = np.clip(start, self._low, self._high)
+        inside = np.clip(start, self.low, self.high)
         x, _ = self.solve(inside, weight, wide > 0.0)
         return self._at(x, weight, 0.0)[0]
 
@@ -545,7 +549,7 @@ class Estimate:
         """What the rows miss (R,), and the slopes (R, P + E) of what is predicted."""
         parts = [each.predicted(x, softness) for each in self._channels]
         predicted = np.concatenate([each for each, _ in parts])
-        return self._measured - predicted, np.concatenate([each for _, each in parts])
+        return self.measured - predicted, np.concatenate([each for _, each in parts])
 
     def _at(
         self, x: FloatArray, weight: FloatArray, softness: float
@@ -553,7 +557,7 @@ class Estimate:
         """Cost, weighted residuals (R,) and their slopes (R, P + E)."""
         missing, slopes = self.rows(x, softness)
         residual = weight * missing
-        pulled = self._pull @ (x - self._before)
+        pulled = self._pull @ (x - self.before)
         cost = float(residual @ residual + pulled @ pulled)
         return cost, residual, weight[:, None] * slopes
 
@@ -566,8 +570,8 @@ class Estimate:
             np.linalg.qr(np.column_stack([slopes[:, free] * scale, residual]), mode="r")
         )
         matrix = np.concatenate([reduced[:, :-1], self._pull[:, free] * scale])
-        target = np.concatenate([reduced[:, -1], self._pull @ (self._before - x)])
-        low, high = ((bound - x)[free] / scale for bound in (self._low, self._high))
+        target = np.concatenate([reduced[:, -1], self._pull @ (self.before - x)])
+        low, high = ((bound - x)[free] / scale for bound in (self.low, self.high))
         bounds = (np.minimum(low, -1e-12), np.maximum(high, 1e-12))
         # few bounds are met: the active set is found several times sooner than an interior point
         solved = lsq_linear(
@@ -587,7 +591,7 @@ class Estimate:
         noise = self._least.copy()
         correlated = np.ones(len(noise))
         for k in range(len(noise)):
-            own = missing[self._group == k]
+            own = missing[self.group == k]
             if len(own):
                 noise[k] = max(float(np.sqrt(np.mean(own**2))), self._least[k])
             correlated[k] = correlation_length(own)
