@@ -52,7 +52,8 @@ def test_the_page_has_both_motions_and_all_figures(compared: BeforeAfter, planne
     ]
     today = data["sides"][0]
     angles = (
-        np.frombuffer(base64.b64decode(today["angles"]), "<i2").reshape(-1, 6) * today["angleStep"]
+        np.frombuffer(base64.b64decode(today["jointValues"]), "<i2").reshape(-1, 6)
+        * today["jointSteps"]
     )
     assert angles[0] == pytest.approx(planner.cell.machine_home, abs=2e-4)
     first = compared.today.movements[0].trajectory

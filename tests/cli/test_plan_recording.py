@@ -99,9 +99,10 @@ def assert_motion_is_that_of_the_plan(page: str, answer: dict[str, Any]) -> None
     scene = drawn["scene"]
     assert drawn["end"] == pytest.approx(answer["seconds"])
     shorts = {
-        name: np.frombuffer(base64.b64decode(scene[name]), "<i2") for name in ("angles", "power")
+        name: np.frombuffer(base64.b64decode(scene[name]), "<i2")
+        for name in ("jointValues", "power")
     }
-    q = scene["angleStep"] * shorts["angles"].reshape(scene["frames"], 6)
+    q = scene["jointSteps"] * shorts["jointValues"].reshape(scene["frames"], 6)
     assert q[0] == pytest.approx(load_cell("kr6_bench").park, abs=2e-4)
     joules = float(shorts["power"].sum()) * scene["step"]
     assert joules == pytest.approx(answer["joules"], rel=0.05)

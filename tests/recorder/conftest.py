@@ -155,6 +155,7 @@ class Run:
 
     phases: list[Phase] = field(default_factory=list)
     savings: list[ProgramSavings] = field(default_factory=list)
+    cell: str = CELL_YAML
 
     def rest(
         self, seconds: float, mode: Mode, q: np.ndarray, load: str, target: Mode | None = None
@@ -189,11 +190,12 @@ class _Recorder:
     def __init__(self, run: Run, path: Path, plan_factor: float, facts: dict[str, str]) -> None:
         self.run = run
         self.factor = plan_factor
-        self.cell = cell_from_yaml(CELL_YAML)
+        self.cell = cell_from_yaml(run.cell)
+        self.joints = list(self.cell.robot.joint_names)
         self.power = load_power_data()
         self.session = RecordingSession(RecordingWriter(path), facts, START_NS)
         self.encode: dict[str, Callable[[Any], bytes]] = {}
-        self.session.attach_cell(CellFiles(CELL_YAML, "<robot name='kr210'/>"), START_NS)
+        self.session.attach_cell(CellFiles(run.cell, "<robot name='kr210'/>"), START_NS)
         for topic, kind, offer in (
             ("/joint_states", "sensor_msgs/msg/JointState", QosOffer(depth=100)),
             ("/ir_sim_driver/power_state", "ir_msgs/msg/PowerState", QosOffer()),
@@ -278,13 +280,13 @@ class _Recorder:
         for k in range(count):
             ns = self.now + k * JOINT_DT_NS
             if not asleep:
-                joints = JointState(name=JOINT_NAMES, position=q[k], velocity=qd[k], effort=tau[k])
+                joints = JointState(name=self.joints, position=q[k], velocity=qd[k], effort=tau[k])
                 joints.header.stamp = stamp(ns)
                 self._put("/joint_states", joints, ns)
             if (k + 1) % 5 == 0:
                 self._power(phase, ns + JOINT_DT_NS, mains, axis, bus, tau, base, k)
             if k % 10 == 0 and not asleep:
-                state = ControllerState(joint_names=JOINT_NAMES, trajectory_id=phase.trajectory_id)
+                state = ControllerState(joint_names=self.joints, trajectory_id=phase.trajectory_id)
                 state.header.stamp = stamp(ns)
                 state.path_time = float(t[k]) if phase.trajectory_id else 0.0
                 state.speed_scaling = 1.0

@@ -20,7 +20,7 @@ def test_the_two_sides_differ_by_what_the_mains_gave(analysis: Analysis) -> None
         joint_energy=np.array([400.0, -300.0, 0.0, 100.0, 0.0, 0.0]),
         dissipated_energy=0.0,
     )
-    shown = joule_bars((moved,))
+    shown = joule_bars((moved,), ("A1", "A2", "A3", "A4", "A5", "A6"))
     assert "1 000 J taken, 300 J returned" in shown
     assert "<b>700 J</b>" in shown
     widths = {m[1]: (float(m[2]), float(m[3])) for m in _pieces(shown)}

@@ -18,12 +18,12 @@ def test_the_motion_is_in_the_page_to_a_hundredth_of_a_degree(
     page: str, demo_file: Path, data_of: Any
 ) -> None:
     scene = data_of(page)["scene"]
-    counts = np.frombuffer(base64.b64decode(scene["angles"]), dtype="<i2").reshape(
+    counts = np.frombuffer(base64.b64decode(scene["jointValues"]), dtype="<i2").reshape(
         scene["frames"], 6
     )
     joints = read_recording(demo_file).joints
-    np.testing.assert_allclose(counts[0] * scene["angleStep"], joints.position[0], atol=1.1e-4)
-    np.testing.assert_allclose(counts[-1] * scene["angleStep"], joints.position[-1], atol=1.1e-4)
+    np.testing.assert_allclose(counts[0] * scene["jointSteps"], joints.position[0], atol=1.1e-4)
+    np.testing.assert_allclose(counts[-1] * scene["jointSteps"], joints.position[-1], atol=1.1e-4)
 
 
 def test_a_part_moves_from_station_to_hand_to_station(page: str, data_of: Any) -> None:

@@ -8,6 +8,7 @@ its private namespace (`own`), so that they move with its name. On the topics th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 JOINT_NAMES: Final = ("joint_a1", "joint_a2", "joint_a3", "joint_a4", "joint_a5", "joint_a6")
@@ -18,6 +19,13 @@ EXTERNAL_AXES: Final = ("E1", "E2", "E3", "E4", "E5", "E6")
 def joint_unit(joint: str, unit: str = "rad") -> str:
     """A unit of joints that turn ("rad/s") as it is for this one: of an external axis with m."""
     return unit.replace("rad", "m") if joint in EXTERNAL_AXES else unit
+
+
+def axis_labels(joints: Sequence[str]) -> tuple[str, ...]:
+    """What people call the axes of joints: an external axis by its name, the others A1, A2, ..."""
+    arm = [joint for joint in joints if joint not in EXTERNAL_AXES]
+    labels = {joint: f"A{k + 1}" for k, joint in enumerate(arm)}
+    return tuple(labels.get(joint, joint) for joint in joints)
 
 
 WORLD_FRAME: Final = "cell"

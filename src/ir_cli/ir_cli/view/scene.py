@@ -87,10 +87,15 @@ def _packed(cell: Cell, content: Mapping[str, Json]) -> bytes:
     base = cell.base_pose
     reach = reach_lines(cell) @ base[:3, :3].T + base[:3, 3]
     robot = cell.robot
-    low, high = np.degrees([robot.position_min, robot.position_max])
+    low, high = robot.in_people_units(np.array([robot.position_min, robot.position_max]))
     joints: list[Json] = [
-        {"name": name, "low": round(float(low[k]), 1), "high": round(float(high[k]), 1)}
-        for k, name in enumerate(robot.joint_names)
+        {
+            "name": robot.axis_label(k),
+            "unit": robot.unit(k),
+            "low": round(float(low[k]), 3),
+            "high": round(float(high[k]), 3),
+        }
+        for k in range(robot.n)
     ]
     stations: list[Json] = [
         {

@@ -342,16 +342,19 @@ class Session:
             "note": one_line(stage.note, _LINE),
         }
 
-    def _joints(self, degrees: list[Any]) -> None:
+    def _joints(self, given: list[Any]) -> None:
+        """Stand at values in degrees, of a rail in m."""
         stage = self._stage
         if stage is None:
             return
         robot = stage.cell.robot
-        if len(degrees) != robot.n or not all(isinstance(each, int | float) for each in degrees):
-            self._say(note=f"the robot has {robot.n} joints: so many numbers in degrees are needed")
+        if len(given) != robot.n or not all(isinstance(each, int | float) for each in given):
+            units = ", ".join(dict.fromkeys(robot.unit(k) for k in range(robot.n)))
+            self._say(note=f"the robot has {robot.n} joints: so many numbers ({units}) are needed")
             return
         stage.note = ""
-        q = np.clip(np.radians(degrees), robot.position_min, robot.position_max)
+        q = robot.from_people_units(np.array(given, dtype=float))
+        q = np.clip(q, robot.position_min, robot.position_max)
         stage.now = stage.cell
         stage.stand(q)
         self._by_hand()

@@ -20,7 +20,7 @@ from ir_description.shapes import Capsule
 from ir_kernels import portable
 from ir_kernels.coupling import Coupling
 from ir_kernels.errors import KernelError
-from ir_msgs_py.names import WORLD_FRAME
+from ir_msgs_py.names import WORLD_FRAME, axis_labels
 from ir_msgs_py.trajectory import in_people_units
 from ir_values.arrays import FloatArray, frozen, frozen_inertia, frozen_pose, in_range
 from ir_values.errors import InvalidValueError
@@ -242,7 +242,7 @@ class RobotModel:
 
     def axis_label(self, joint: int) -> str:
         """What people call the axis of a joint: A1 to A6, of a rail its name."""
-        return self.joint_names[0] if joint < self.base else f"A{joint - self.base + 1}"
+        return axis_labels(self.joint_names)[joint]
 
     @cached_property
     def coupled(self) -> bool:

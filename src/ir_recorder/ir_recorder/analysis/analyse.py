@@ -52,7 +52,6 @@ from ir_recorder.analysis.results import (
 )
 from ir_recorder.analysis.steps import ExecutedStep, executed_steps
 from ir_recorder.analysis.tending import SignalChange, TendedStep, Tending, tending_of
-from ir_recorder.errors import ReadError
 from ir_recorder.format import contents
 from ir_recorder.reading.recording import Recording
 from ir_values.arrays import FloatArray
@@ -293,13 +292,7 @@ class _Analyser:
             self.problems.append("no cell is attached: no clearance, no machines in the picture")
             return None
         try:
-            cell = cell_from_yaml(self.recording.cell_yaml, "the attached cell")
-            if cell.robot.rail is not None:
-                raise ReadError(
-                    f"the recording is of a robot on the rail {cell.robot.rail.name}: its signals "
-                    "can be read and played, an analysis has six axes"
-                )
-            return cell
+            return cell_from_yaml(self.recording.cell_yaml, "the attached cell")
         except (DescriptionError, InvalidValueError, RecursionError) as error:
             self.problems.append(f"the attached cell can't be read: {error}")
             return None

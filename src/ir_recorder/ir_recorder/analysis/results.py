@@ -11,6 +11,7 @@ import numpy as np
 
 from ir_description import Cell
 from ir_msgs_py.modes import Mode
+from ir_msgs_py.names import JOINT_NAMES, axis_labels
 from ir_msgs_py.report import MovementKind
 from ir_msgs_py.savings import ProgramSavings
 from ir_recorder.analysis.clearance import StepClearance
@@ -260,6 +261,13 @@ class Analysis:
             return None
         longer = re.fullmatch(r"(\d+\.\d+) s", self.recording.fact(contents.COMMON_SECONDS))
         return replace(known[-1], common_seconds=float(longer[1])) if longer else known[-1]
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Labels of the robot's axes: of the recorded joints, else of the cell's."""
+        if self.recording.joints is not None:
+            return self.recording.joints.axes
+        return axis_labels(JOINT_NAMES if self.cell is None else self.cell.robot.joint_names)
 
     @property
     def movements(self) -> tuple[StepResult, ...]:

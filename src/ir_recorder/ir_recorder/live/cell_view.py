@@ -149,7 +149,14 @@ class CellView:
         content = {
             **cell_scene(cell),
             "bodies": door_bodies(read, doors),
-            **{"start": 0.0, "step": 1.0, "frames": 0, "angleStep": 1.0, "angles": "", "power": ""},
+            **{
+                "start": 0.0,
+                "step": 1.0,
+                "frames": 0,
+                "jointSteps": [],
+                "jointValues": "",
+                "power": "",
+            },
             "parts": [
                 {"name": part.name, "lies": [], "meshes": part_meshes(cell, part.name)}
                 for part in cell.parts

@@ -23,8 +23,8 @@ GRAVITY = 9.80665  # m/s^2, standard
 
 @dataclass(frozen=True, eq=False)
 class ArmTorques:
-    """What moves the bodies, each (N, n) Nm at the joints: links, loads, rotors, and the
-    counterbalance, which helps.
+    """What moves the bodies, each (N, n) Nm at the joints, N at a rail: links, loads, rotors, and
+    the counterbalance, which helps.
     """
 
     links: FloatArray
@@ -63,9 +63,9 @@ def arm_torques(
         frame, axes[i] = _next(frame, robot, i, q[:, i], qd[:, i], qdd[:, i])
         places[i] = frame.place
         link = (float(robot.link_mass[i + 1]), robot.link_com[i + 1], robot.link_inertia[i + 1])
-        _project(links, frame, axes[: i + 1], places[: i + 1], *link)
+        _project(links, frame, robot, axes[: i + 1], places[: i + 1], *link)
     for load in loads:
-        _project(held, frame, axes, places, load.mass, load.com, load.inertia)
+        _project(held, frame, robot, axes, places, load.mass, load.com, load.inertia)
     return ArmTorques(links, held, qdd * robot.reflected_inertia, spring_torque(robot, q))
 
 
@@ -90,7 +90,8 @@ def centre_torques(
             for side in (-0.5, 0.5):
                 part = np.zeros((N, n))
                 centre = robot.link_com[i + 1] + side * direction
-                _project(part, frame, axes[: i + 1], places[: i + 1], mass, centre, inertia)
+                before = (axes[: i + 1], places[: i + 1])
+                _project(part, frame, robot, *before, mass, centre, inertia)
                 own[i] += np.sign(side) * part
     return found
 
@@ -105,11 +106,16 @@ def _base(N: int, pose: FloatArray) -> _Frame:
 def _next(
     before: _Frame, robot: RobotModel, i: int, q: FloatArray, qd: FloatArray, qdd: FloatArray
 ) -> tuple[_Frame, FloatArray]:
-    """The link after joint i, and the joint's axis (N, 3) in the world."""
+    """The link after joint i, and the joint's axis (N, 3) in the world; a rail is the first."""
     origin = robot.joint_origin[i]
     axis = robot.joint_axis[i]
     arm = before.turn @ origin[:3, 3]
     still = before.turn @ origin[:3, :3]
+    if i < robot.base:  # slides on a base that stands
+        world = still @ axis
+        place = before.place + arm + q[:, None] * world
+        push = before.push + qdd[:, None] * world
+        return _Frame(still, place, before.spin, before.spin_rate, push), world
     turn = still @ _turned(axis, q)
     world = turn @ axis
     spin = before.spin + qd[:, None] * world
@@ -135,13 +141,16 @@ def _carried(spin: FloatArray, rate: FloatArray, arm: FloatArray) -> FloatArray:
 def _project(
     torque: FloatArray,
     frame: _Frame,
+    robot: RobotModel,
     axes: FloatArray,
     places: FloatArray,
     mass: float,
     com: FloatArray,
     inertia: FloatArray,
 ) -> None:
-    """Add what a body of the frame asks of the joints 0..len(axes) to torque (N, n)."""
+    """Add what a body of the frame asks of the joints 0..len(axes) to torque (N, n): the moment
+    about those that turn, the force along a rail.
+    """
     arm = frame.turn @ com
     force = mass * (frame.push + _carried(frame.spin, frame.spin_rate, arm))
     world = frame.turn @ inertia @ frame.turn.transpose(0, 2, 1)
@@ -149,7 +158,8 @@ def _project(
     moment = (world @ frame.spin_rate[:, :, None])[:, :, 0] + np.cross(frame.spin, momentum)
     centre = frame.place + arm
     for j, (axis, place) in enumerate(zip(axes, places, strict=True)):
-        torque[:, j] += ((np.cross(centre - place, force) + moment) * axis).sum(axis=1)
+        asked = force if j < robot.base else np.cross(centre - place, force) + moment
+        torque[:, j] += (asked * axis).sum(axis=1)
 
 
 def spring_torque(robot: RobotModel, q: FloatArray) -> FloatArray:
@@ -197,7 +207,8 @@ def pinocchio_torques(
     model.gravity.linear = np.asarray(base_pose)[:3, :3].T @ [0.0, 0.0, -GRAVITY]
     for i, (origin, axis) in enumerate(zip(robot.joint_origin, robot.joint_axis, strict=True)):
         place = pinocchio.SE3(origin[:3, :3].copy(), origin[:3, 3].copy())
-        joint = pinocchio.JointModelRevoluteUnaligned(axis.copy())
+        kind = "Prismatic" if i < robot.base else "Revolute"
+        joint = getattr(pinocchio, f"JointModel{kind}Unaligned")(axis.copy())
         parent = model.addJoint(parent, joint, place, f"joint_{i}")
         bodies = [(robot.link_mass[i + 1], robot.link_com[i + 1], robot.link_inertia[i + 1])]
         bodies += [(load.mass, load.com, load.inertia) for load in loads if i == robot.n - 1]

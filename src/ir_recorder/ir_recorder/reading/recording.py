@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ir_msgs_py.names import axis_labels
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.search_log import SearchLog
@@ -37,7 +38,7 @@ class TopicSummary:
 @dataclass(frozen=True, eq=False)
 class JointSeries(_ReadOnlyArrays):
     """/joint_states: stamp_ns (N,), time (N,) s, position (N, n) rad, velocity (N, n) rad/s, effort
-    (N, n) Nm.
+    (N, n) Nm; of an external axis in m, m/s, N.
     """
 
     names: tuple[str, ...]
@@ -46,6 +47,11 @@ class JointSeries(_ReadOnlyArrays):
     position: FloatArray
     velocity: FloatArray
     effort: FloatArray
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """What people call the joints' axes."""
+        return axis_labels(self.names)
 
 
 @dataclass(frozen=True, eq=False)

@@ -168,18 +168,20 @@ def tick_step(span: float) -> float:
 # mains gave, but for what stays in the capacitors; it stands beside the bar.
 
 
-def joule_bars(results: Sequence[StepResult]) -> str:
-    """One bar per movement; a line marks the plan, a diamond what the mains gave."""
+def joule_bars(results: Sequence[StepResult], axes: Sequence[str]) -> str:
+    """One bar per movement; a line marks the plan, a diamond what the mains gave. axes: labels of
+    the joints.
+    """
     if not results:
         return '<p class="empty">No movements were recorded.</p>'
-    return bars([_movement(result) for result in results], "energy of each movement", joules)
+    return bars([_movement(result, axes) for result in results], "energy of each movement", joules)
 
 
-def _movement(result: StepResult) -> Row:
+def _movement(result: StepResult, axes: Sequence[str]) -> Row:
     plan = result.step.movement.report.energy
     row = Row(
         f"{result.step.index + 1} {result.step.label}",
-        _consumers(result),
+        _consumers(result, axes),
         joules(result.energy),
         marks=(
             Mark("plan", f"predicted {joules(plan)}", plan),
@@ -192,9 +194,10 @@ def _movement(result: StepResult) -> Row:
     return Row(row.label, row.pieces, row.value, (sides,), row.marks)
 
 
-def _consumers(result: StepResult) -> tuple[Piece, ...]:
+def _consumers(result: StepResult, axes: Sequence[str]) -> tuple[Piece, ...]:
     own = [("base", "controller, drives and tool", result.base_energy)]
-    own += [(f"a{j + 1}", f"axis A{j + 1}", float(v)) for j, v in enumerate(result.joint_energy)]
+    energies = zip(axes, result.joint_energy, strict=False)  # none of a file without joints
+    own += [(label.lower(), f"axis {label}", float(joules)) for label, joules in energies]
     own.append(("dissipated", "brake resistor", result.dissipated_energy))
     return tuple(
         Piece(style, f"{name} {'takes' if value >= 0.0 else 'returns'} {joules(abs(value))}", value)

@@ -23,6 +23,7 @@ def cell_scene(cell: Cell) -> dict[str, Json]:
         "base": matrix(cell.base_pose),
         "tcp": matrix(cell.tcp),
         "jointOrigins": [matrix(pose) for pose in cell.robot.joint_origin],
+        "slides": cell.robot.base,
         "jointAxes": [[round(float(x), 9) for x in axis] for axis in cell.robot.joint_axis],
         "shapes": [*_robot_shapes(cell), *_load_shapes(cell)],
         "bodies": _bodies(cell),

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_description import Cell, PartPlaces, data_sheet_of
+from ir_description import Cell, PartPlaces, RobotModel, data_sheet_of
 from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_msgs_py.savings import Side
 from ir_msgs_py.trajectory import JointTrajectory
@@ -59,8 +59,7 @@ def scene(analysis: Analysis) -> dict[str, Json] | None:
         "start": float(time[0]),
         "step": float(time[1] - time[0]),
         "frames": len(time),
-        "angleStep": ANGLE_STEP,
-        "angles": quantised(q, ANGLE_STEP),
+        **_values(q, cell.robot),
         "power": quantised(_power(analysis, time), POWER_STEP),
         **cell_scene(cell),
         "bodies": door_bodies(cell, analysis.recording.machines),
@@ -68,6 +67,16 @@ def scene(analysis: Analysis) -> dict[str, Json] | None:
         "loads": [[round(t, 3), load] for t, load in _load_changes(analysis)],
         "nearest": _nearest(analysis),
     }
+
+
+def _values(q: FloatArray, robot: RobotModel) -> dict[str, Json]:
+    """Joint values (N, n) as whole steps: of those that turn 0.2 mrad, of a rail what its travel
+    needs.
+    """
+    steps = np.full(robot.n, ANGLE_STEP)
+    if robot.rail is not None:
+        steps[0] = max(abs(robot.rail.low), abs(robot.rail.high)) / 32_000.0
+    return {"jointSteps": steps.tolist(), "jointValues": quantised(q, steps)}
 
 
 def _frames(time: FloatArray) -> FloatArray:
@@ -144,8 +153,7 @@ def motion_of(side: Side, cell: Cell) -> dict[str, Json]:
         "start": 0.0,
         "step": float(time[1] - time[0]),
         "frames": len(time),
-        "angleStep": ANGLE_STEP,
-        "angles": quantised(_joints(side, time), ANGLE_STEP),
+        **_values(_joints(side, time), cell.robot),
         "power": quantised(watts, POWER_STEP),
         "parts": _parts(side, cell),
         "loads": [[round(at, 3), step.load or "none"] for at, step in _timed(side)],

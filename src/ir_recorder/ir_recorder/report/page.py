@@ -187,7 +187,11 @@ def _engineers(analysis: Analysis, checks: Sequence[Finding], capacity: str) -> 
     places = f"<h3>Stations</h3>{station_table(analysis)}"
     modes = f"<h3>Power modes</h3>{mode_table(analysis)}"
     parts = [
-        fold("Energy of each movement, by consumer", _CONSUMERS, joule_bars(analysis.movements)),
+        fold(
+            "Energy of each movement, by consumer",
+            _consumers(analysis.axes),
+            joule_bars(analysis.movements, analysis.axes),
+        ),
         fold(
             "Steps of the program",
             _CARRIED.format(text(capacity), " Select a step to see it." if analysis.steps else ""),
@@ -212,16 +216,20 @@ def _engineers(analysis: Analysis, checks: Sequence[Finding], capacity: str) -> 
     return "\n".join(part for part in parts if part)
 
 
-_AXES = "".join(f'<span><i class="key a{k}"></i>A{k}</span> ' for k in range(1, 7))
-_CONSUMERS = (
-    '<p class="key-row"><span><i class="key base"></i>controller, drives, tool</span> '
-    f'{_AXES}<span><i class="key dissipated"></i>brake resistor</span> '
-    '<span><i class="key plan"></i>predicted</span> <span><i class="key net"></i>at the mains'
-    '</span></p><p class="hint">Net energy of each consumer: right of zero what it took, left of '
-    "zero what a braking axis returned to the others and to the capacitors. The figure beside a "
-    "bar is the net energy from the mains: the sum of both sides, but for what stays in the "
-    "capacitors.</p>"
-)
+def _consumers(axes: Sequence[str]) -> str:
+    """Key of the bars: the controller, the axes by their labels, the brake resistor."""
+    keys = "".join(f'<span><i class="key {label.lower()}"></i>{label}</span> ' for label in axes)
+    return (
+        '<p class="key-row"><span><i class="key base"></i>controller, drives, tool</span> '
+        f'{keys}<span><i class="key dissipated"></i>brake resistor</span> '
+        '<span><i class="key plan"></i>predicted</span> <span><i class="key net"></i>at the mains'
+        '</span></p><p class="hint">Net energy of each consumer: right of zero what it took, left '
+        "of zero what a braking axis returned to the others and to the capacitors. The figure "
+        "beside a bar is the net energy from the mains: the sum of both sides, but for what stays "
+        "in the capacitors.</p>"
+    )
+
+
 _CARRIED = (
     '<p class="hint">Predicted without losses that the data sheet puts at zero: they can only add, '
     "so most 90 % intervals lie above. Pauses include the way into their mode and back. Clearance: "

@@ -5,12 +5,14 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ir_msgs_py.names import EXTERNAL_AXES
+from ir_msgs_py.trajectory import in_people_units
 from ir_recorder.analysis import Analysis
 from ir_recorder.reading.recording import Recording, TextEvent
 from ir_values.arrays import FloatArray
@@ -64,12 +66,13 @@ def floats(values: ArrayLike) -> str:
     return _base64(np.asarray(values, dtype="<f4"))
 
 
-def quantised(values: ArrayLike, step: float) -> str:
-    """An array (...) as int16 multiples of `step`, little endian, in base64; clipped to its
-    range.
+def quantised(values: ArrayLike, step: float | FloatArray) -> str:
+    """An array (...) as int16 multiples of `step`, of its last axis one step or each its own,
+    little endian, in base64; clipped to its range.
     """
-    kept = np.clip(np.nan_to_num(np.asarray(values, dtype=float)), -32768 * step, 32767 * step)
-    return _base64(np.rint(kept / step).astype("<i2"))
+    one = np.asarray(step)
+    kept = np.clip(np.nan_to_num(np.asarray(values, dtype=float)), -32768 * one, 32767 * one)
+    return _base64(np.rint(kept / one).astype("<i2"))
 
 
 def indices(values: ArrayLike) -> str:
@@ -106,8 +109,8 @@ _STEPS = 32_000  # of int16
 @dataclass(frozen=True, eq=False)
 class Curves:
     """One quantity: time (N,) s, value (N, n) in `unit`, limit (n, 2); series: what the columns
-    are. low (N, n): the lowest values where `value` has the highest ones of stretches, which are
-    drawn as they are.
+    are, "axes" A1 to An or the name of a single curve. low (N, n): the lowest values where `value`
+    has the highest ones of stretches, which are drawn as they are.
     """
 
     name: str
@@ -138,43 +141,85 @@ def _curves(analysis: Analysis) -> Iterator[Curves]:
     joints = recording.joints
     power = recording.power
     controller = recording.controller
+    rail = _rail(analysis)
     if joints is not None:
-        position, speed, torque = _limits(analysis, joints.position.shape[1])
-        yield Curves("position", "°", joints.time, np.degrees(joints.position), position)
-        yield Curves("speed", "°/s", joints.time, np.degrees(joints.velocity), speed)
-        yield Curves("torque", "Nm", joints.time, joints.effort, torque)
+        limits = _limits(analysis, joints.position.shape[1])
+        position = in_people_units(joints.names, joints.position)
+        speed = in_people_units(joints.names, joints.velocity)
+        turning = Curves("position", "°", joints.time, position, limits[0])
+        yield from _with_rail(turning, rail, "position", "m")
+        turning = Curves("speed", "°/s", joints.time, speed, limits[1])
+        yield from _with_rail(turning, rail, "speed", "m/s")
+        turning = Curves("torque", "Nm", joints.time, joints.effort, limits[2])
+        yield from _with_rail(turning, rail, "force", "N")
     if power is not None:
-        yield Curves("power at the DC bus", "W", power.time, power.joint_power)
+        drawn = Curves("power at the DC bus", "W", power.time, power.joint_power)
+        yield from _with_rail(drawn, rail, "power at the DC bus", "W")
     if controller is not None:
-        error, unit = _readable(controller.joint_error)
-        yield Curves("tracking error", unit, controller.time, error, shown=False)
+        error = controller.joint_error
+        slides = int(bool(rail))
+        scaled, unit = _readable(error[:, slides:], "rad")
+        yield Curves("tracking error", unit, controller.time, scaled, shown=False)
+        if rail:
+            scaled, unit = _readable(error[:, :1], "m")
+            name = f"tracking error of {rail}"
+            yield Curves(name, unit, controller.time, scaled, shown=False, series=rail)
         tool = controller.tool_deviation[:, None] * 1e3
         yield Curves("tool off its path", "mm", controller.time, tool, shown=False, series="tool")
     if power is not None:
-        yield Curves(
-            "temperature of the gear", "°C", power.time, power.joint_temperature, shown=False
-        )
+        warm = power.joint_temperature
+        curves = Curves("temperature of the gear", "°C", power.time, warm, shown=False)
+        yield from _with_rail(curves, rail, "temperature of the gear", "°C")
+
+
+def _rail(analysis: Analysis) -> str:
+    """Name of the external axis that the first joint is, "" where the robot stands."""
+    joints = analysis.recording.joints
+    if joints is None or joints.names[0] not in EXTERNAL_AXES:
+        return ""
+    return joints.names[0]
+
+
+def _with_rail(curves: Curves, rail: str, name: str, unit: str) -> Iterator[Curves]:
+    """The arm's curves, and those of a rail, the first column, in a chart and unit of its own."""
+    if not rail:
+        yield curves
+        return
+    limit = curves.limit
+    yield replace(curves, value=curves.value[:, 1:], limit=None if limit is None else limit[1:])
+    yield replace(
+        curves,
+        name=f"{name} of {rail}",
+        unit=unit,
+        value=curves.value[:, :1],
+        limit=None if limit is None else limit[:1],
+        series=rail,
+    )
 
 
 def _limits(
     analysis: Analysis, n: int
 ) -> tuple[FloatArray | None, FloatArray | None, FloatArray | None]:
-    """Limits (n, 2) of position [deg], speed [deg/s] and torque [Nm] by the data of the robot."""
+    """Limits (n, 2) of position [deg, m], speed [deg/s, m/s] and torque [Nm, N] by the data of the
+    robot.
+    """
     if analysis.cell is None or analysis.cell.robot.n != n:
         return None, None, None
     robot = analysis.cell.robot
     torque = robot.envelope_torque[:, 0]
+    position = np.stack([robot.position_min, robot.position_max])
+    speed = np.stack([-robot.velocity_max, robot.velocity_max])
     return (
-        np.degrees(np.stack([robot.position_min, robot.position_max], axis=1)),
-        np.degrees(np.stack([-robot.velocity_max, robot.velocity_max], axis=1)),
+        robot.in_people_units(position).T,
+        robot.in_people_units(speed).T,
         np.stack([-torque, torque], axis=1),
     )
 
 
-def _readable(error: FloatArray) -> tuple[FloatArray, str]:
-    """Radians as mrad, or as µrad where all are below one mrad."""
+def _readable(error: FloatArray, unit: str) -> tuple[FloatArray, str]:
+    """Radians or metres in thousandths, or in millionths where all are below a thousandth."""
     most = float(np.nanmax(np.abs(error))) if _seen(error) else 0.0
-    return (error * 1e3, "mrad") if most >= 1e-3 else (error * 1e6, "µrad")
+    return (error * 1e3, f"m{unit}") if most >= 1e-3 else (error * 1e6, f"µ{unit}")
 
 
 def packed(curves: Curves) -> dict[str, Json]:

@@ -317,9 +317,9 @@ def lathe(profile: FloatArray) -> Mesh:
 
 def _housings(robot: RobotModel) -> Iterator[SurfacePart]:
     """A cylinder about each joint that swings, on the link that it carries and nearly as thick as
-    it.
+    it; a rail has none.
     """
-    for link in range(1, len(robot.joint_axis) + 1):
+    for link in range(1 + robot.base, len(robot.joint_axis) + 1):
         axis = robot.joint_axis[link - 1]
         near = [c for c in robot.capsules if c.link == link and _distance(c) < c.radius]
         swings = [

@@ -51,7 +51,10 @@ def _row(analysis: Analysis, result: StepResult) -> dict[str, TableValue]:
         **{"energy_j": result.energy, "predicted_j": report.energy},
         **{"predicted_low_j": report.energy_low, "predicted_high_j": report.energy_high},
         **{"base_j": result.base_energy, "brake_resistor_j": result.dissipated_energy},
-        **{f"axis_{k + 1}_net_j": float(value) for k, value in enumerate(result.joint_energy)},
+        **{
+            f"axis_{label.removeprefix('A').lower()}_net_j": float(joules)
+            for label, joules in zip(analysis.axes, result.joint_energy, strict=False)
+        },
         **{"from_positions_j": result.indirect_energy, "from_torques_j": result.torque_energy},
         **{"peak_w": result.peak_power, "tool_deviation_m": result.tool_deviation},
         "clearance_m": near.least if near is not None else math.nan,

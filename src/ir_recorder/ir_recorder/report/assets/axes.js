@@ -38,9 +38,9 @@ class AxesChart extends TimeChart {
   beyond(value) { return this.curves.most !== undefined && value >= 0.999 * this.curves.most; }
   names() {
     if (this.curves.names) return this.curves.names;
-    return this.curves.series === "tool" ? ["tool"] : Array.from({ length: this.curves.count }, (_, k) => `A${k + 1}`);
+    return this.curves.series === "axes" ? Array.from({ length: this.curves.count }, (_, k) => `A${k + 1}`) : [this.curves.series];
   }
-  used() { return this.names().map((_, k) => k).filter((k) => this.curves.series === "tool" || this.shown.axes[k]); }
+  used() { return this.names().map((_, k) => k).filter((k) => this.curves.series !== "axes" || this.shown.axes[k]); }
   draw() {
     const g = this.begin();
     this.timeAxis(g);
@@ -57,7 +57,7 @@ class AxesChart extends TimeChart {
     this.valueAxis(g, low, high, this.curves.unit, y);
     this.plot(g);
     for (const k of axes) {
-      const named = this.curves.series === "tool" ? null : look(k);
+      const named = this.curves.series === "axes" ? look(k) : null;
       g.strokeStyle = css(named ? named.colour : "--accent");
       if (limits) {
         g.setLineDash([6, 4]);
@@ -140,7 +140,7 @@ class AxesChart extends TimeChart {
 /* Toggles for axes, quantities and limits, and a chart for each quantity. */
 function axesSection(place, timeline, tip, list) {
   const shown = { axes: Array(list.reduce((n, c) => Math.max(n, c.count), 0)).fill(true), limits: false }, charts = [];
-  const bar = place.querySelector(".toggles"), most = list.reduce((n, c) => Math.max(n, c.series === "tool" ? 0 : c.count), 0);
+  const bar = place.querySelector(".toggles"), most = list.reduce((n, c) => Math.max(n, c.series === "axes" ? c.count : 0), 0);
   const toggle = (label, checked, change, style) => {
     const box = document.createElement("label"), input = document.createElement("input");
     input.type = "checkbox";

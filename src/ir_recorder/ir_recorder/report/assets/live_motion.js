@@ -15,7 +15,7 @@ class LiveMotion extends Motion {
   posesOf(q) {
     const poses = [new Float32Array(this.scene.base)];
     for (let i = 0; i < this.n; i++) {
-      poses.push(M4.times(poses[i], M4.times(this.scene.jointOrigins[i], M4.turn(this.scene.jointAxes[i], q && q.length === this.n ? q[i] : 0))));
+      poses.push(M4.times(poses[i], this.jointPose(i, q && q.length === this.n ? q[i] : 0)));
     }
     return poses;
   }

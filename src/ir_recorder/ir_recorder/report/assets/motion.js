@@ -21,7 +21,7 @@ class Motion {
   /* The scene to draw: surfaces, and the motion if it has one. */
   take(scene) {
     this.scene = scene;
-    this.q = shorts(scene.angles);
+    this.q = shorts(scene.jointValues);
     this.power = shorts(scene.power);
     this.n = scene.jointOrigins.length;
     this.frames = scene.frames;
@@ -67,13 +67,17 @@ class Motion {
     this.recolour();
   }
   frame(time) { return Math.min(Math.max((time - this.scene.start) / this.scene.step, 0), this.frames - 1); }
+  /* The pose of a link in the one before it, for a joint's value in rad, of a rail in m. */
+  jointPose(i, value) {
+    const axis = this.scene.jointAxes[i], moved = i < this.scene.slides ? M4.slide(axis, value) : M4.turn(axis, value);
+    return M4.times(this.scene.jointOrigins[i], moved);
+  }
   /* Poses of all links, the base first; joint values are interpolated between frames. */
   linkPoses(frame) {
     const k = Math.min(Math.floor(frame), this.frames - 2), x = frame - k, poses = [new Float32Array(this.scene.base)];
     for (let i = 0; i < this.n; i++) {
       const a = this.q[k * this.n + i], b = this.q[(k + 1) * this.n + i];
-      const joint = M4.times(this.scene.jointOrigins[i], M4.turn(this.scene.jointAxes[i], (a + (b - a) * x) * this.scene.angleStep));
-      poses.push(M4.times(poses[i], joint));
+      poses.push(M4.times(poses[i], this.jointPose(i, (a + (b - a) * x) * this.scene.jointSteps[i])));
     }
     return poses;
   }

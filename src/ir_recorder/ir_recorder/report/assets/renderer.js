@@ -9,6 +9,7 @@ const M4 = {
     }
     return out;
   },
+  slide(axis, way) { return [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, axis[0] * way, axis[1] * way, axis[2] * way, 1]; },
   turn(axis, angle) {
     const [x, y, z] = axis, c = Math.cos(angle), s = Math.sin(angle), t = 1 - c;
     return [t * x * x + c, t * x * y + s * z, t * x * z - s * y, 0, t * x * y - s * z, t * y * y + c, t * y * z + s * x, 0,

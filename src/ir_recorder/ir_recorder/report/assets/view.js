@@ -22,10 +22,10 @@ class CellMotion extends Motion {
     }
   }
   get hand() { return this.state && this.state.hand ? this.state.q : null; }
-  /* Poses of all links for joint values [rad]. */
+  /* Poses of all links for joint values [rad], of a rail [m]. */
   posesOf(q) {
     const poses = [new Float32Array(this.scene.base)];
-    for (let i = 0; i < this.n; i++) poses.push(M4.times(poses[i], M4.times(this.scene.jointOrigins[i], M4.turn(this.scene.jointAxes[i], q[i]))));
+    for (let i = 0; i < this.n; i++) poses.push(M4.times(poses[i], this.jointPose(i, q[i])));
     return poses;
   }
   linkPoses(frame) { return this.hand && this.hand.length === this.n && this.drawing ? this.posesOf(this.hand) : super.linkPoses(frame); }
@@ -194,27 +194,33 @@ async function events(url, headers, take) {
   /* joints by hand */
   const sliders = (joints) => {
     if (find("sliders").childElementCount === joints.length) return;
-    find("sliders").replaceChildren(...joints.map(({ name, low, high }, k) => {
+    axes = joints;
+    find("sliders").replaceChildren(...joints.map(({ name, unit, low, high }, k) => {
       const label = element("label"), input = element("input"), output = element("output");
-      Object.assign(input, { type: "range", min: low, max: high, step: 0.1, value: 0 });
-      input.setAttribute("aria-label", `joint ${name}, degrees`);
+      Object.assign(input, { type: "range", min: low, max: high, step: unit === "m" ? 0.001 : 0.1, value: 0 });
+      input.setAttribute("aria-label", `axis ${name}, ${unit === "m" ? "metres" : "degrees"}`);
       input.addEventListener("input", () => {
-        output.textContent = `${Number(input.value).toFixed(1)}°`;
+        output.textContent = axisText(k, Number(input.value));
         state.hand = true;
-        state.q = [...find("sliders").querySelectorAll("input")].map((each) => Number(each.value) * Math.PI / 180);
+        const values = [...find("sliders").querySelectorAll("input")].map((each) => Number(each.value));
+        state.q = values.map((value, j) => value / perUnit(j));
         motion.schedule();
-        ask("joints", state.q.map((v) => v * 180 / Math.PI));
+        ask("joints", values);
       });
-      label.append(element("span", `A${k + 1}`), input, output);
+      label.append(element("span", name), input, output);
       return label;
     }));
   };
+  /* How a joint's value is shown: degrees for each radian, metres as they are. */
+  let axes = [];
+  const perUnit = (k) => axes[k].unit === "m" ? 1 : 180 / Math.PI;
+  const axisText = (k, value) => axes[k].unit === "m" ? `${value.toFixed(3)} m` : `${value.toFixed(1)}°`;
   const showJoints = () => {
     [...find("sliders").querySelectorAll("label")].forEach((label, k) => {
       const [input, output] = [label.querySelector("input"), label.querySelector("output")];
       if (document.activeElement !== input && state.q) {
-        input.value = state.q[k] * 180 / Math.PI;
-        output.textContent = `${(state.q[k] * 180 / Math.PI).toFixed(1)}°`;
+        input.value = state.q[k] * perUnit(k);
+        output.textContent = axisText(k, state.q[k] * perUnit(k));
       }
     });
   };
