@@ -43,6 +43,21 @@ def test_checks_hold_for_a_run_as_planned(analysis: Analysis) -> None:
     assert summary(checks)[0] is Verdict.HOLDS
 
 
+def test_a_recording_says_itself_how_many_modes_it_has_to_show(analysis: Analysis) -> None:
+    """What `ir demo` checks, `ir report` of its recording checks as well."""
+    shown = len(analysis.plateaus)
+    assert shown > 0
+
+    def checked(fact: str) -> list[Verdict]:
+        recording = replace(analysis.recording, facts=(("modes_at_rest", fact),))
+        found = findings(replace(analysis, recording=recording))
+        return [check.verdict for check in named(found, "modes shown")]
+
+    assert checked(str(shown)) == [Verdict.HOLDS]
+    assert checked(str(shown + 1)) == [Verdict.FAILS]
+    assert [checked(fact) for fact in ("", "0", "many", "9" * 5000)] == [[], [], [], []]
+
+
 def test_every_check_gives_the_reason_of_its_bound(analysis: Analysis) -> None:
     for check in findings(analysis):
         assert check.reason or check.verdict is Verdict.NOT_CHECKED

@@ -218,8 +218,25 @@ def test_nights_are_named_beside_each_year(analysis: Analysis) -> None:
     page = plain(report_html(analysis, (), costs=costs))
     year = page.split('id="year"')[1].partition("</section>")[0]
     left, deep = (yearly_money(each, "EUR") for each in (idle.left_alone, idle.deepest))
-    assert year.count(f"{left} outside on closed brakes") == 2  # the common program, and as driven
-    assert year.count(f"{deep} outside in hibernation") == 1
+    assert year.count(f"{left} outside") == 2  # the common program, and as driven
+    assert year.count(f"{deep} outside") == 1
+    assert year.count("nights on closed brakes</span>") == 2
+    assert "planned program, nights in hibernation</span>" in year
+
+
+def test_bars_of_recordings_are_the_years_of_the_table_below(analysis: Analysis) -> None:
+    """A plan was 452 EUR there, with nights on brakes, and 235 EUR on its own page, with nights in
+    hibernation; the table below had 132 EUR, without nights.
+    """
+    cycle = production_of(analysis)
+    assert cycle is not None
+    costs = Costs()
+    price = yearly_money(costs.energy_of_year(cycle).of(costs.money).value, "EUR")
+    page = plain(comparison_html([(analysis, ()), (analysis, ())], costs))
+    bars = page.split('class="bars"')[1].partition("</section>")[0].partition("<table")[0]
+    assert re.findall(r'class="value"><b>([^<]*)</b>', bars) == [price, price]
+    row = page.split("a year of such cycles</td>")[1].partition("</tr>")[0]
+    assert re.findall(r"<b>([^<]*)</b>", row) == [price, price]
 
 
 def test_a_plan_that_nobody_drove_is_among_what_could_still_be_saved(

@@ -39,7 +39,6 @@ from ir_program_runner.settings import LinkSettings
 from ir_recorder import (
     Analysis,
     Finding,
-    Tolerances,
     Verdict,
     analyse,
     findings,
@@ -202,16 +201,14 @@ def _check_sentence(check: Finding) -> str:
     )
 
 
-def examine(
-    recording: Path, report: Path, picture: Path, loads: int, failed: str = ""
-) -> DemoOutcome:
-    """Analyse the recording, write report and picture; loads: how many the tour carried; failed:
-    why the demonstration ended early.
+def examine(recording: Path, report: Path, picture: Path, failed: str = "") -> DemoOutcome:
+    """Analyse the recording, write report and picture; failed: why the demonstration ended
+    early.
     """
     analysis = analyse(read_recording(recording))
     if failed:
         analysis = replace(analysis, problems=(failed, *analysis.problems))
-    checks = findings(analysis, Tolerances(resting_rows=MODES_AT_REST * loads))
+    checks = findings(analysis)
     write_report(analysis, checks, report)
     write_picture(analysis, picture)
     return DemoOutcome(analysis, checks)
@@ -352,10 +349,7 @@ class Demonstration:
                 failed = self._story(client)
             nodes.end()
         progress.begin("read the recording, write report and picture")
-        loads = 0 if failed else len(self._loads)
-        outcome = examine(
-            recording, self._out / "report.html", self._out / "demo.png", loads, failed
-        )
+        outcome = examine(recording, self._out / "report.html", self._out / "demo.png", failed)
         progress.end(f"{self._out / 'report.html'}, {self._out / 'demo.png'}")
         return outcome
 
@@ -401,6 +395,8 @@ class Demonstration:
         }
         if self._saves.common_seconds > 0.0:
             facts[contents.COMMON_SECONDS] = f"{self._saves.common_seconds!r} s"
+        if self._loads:
+            facts[contents.MODES_AT_REST] = str(MODES_AT_REST * len(self._loads))
         if self._full_pauses:
             facts[contents.UNSHORTENED_PAUSES] = ", ".join(
                 f"{seconds:g} s" for seconds in self._full_pauses

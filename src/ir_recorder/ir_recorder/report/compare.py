@@ -257,31 +257,19 @@ def _year_bars(
     names: Sequence[str],
     costs: Costs,
 ) -> str:
-    """A year of such cycles of each recording, nights on brakes, with the interval of what is
-    predicted.
+    """A year of such cycles of each recording, as the table below has it, with the interval of what
+    is predicted.
     """
     rows = []
     for analysis, cycle, name in zip(analyses, cycles, names, strict=True):
         if cycle is None:
             continue
         price = costs.energy_of_year(cycle).of(costs.money)
-        idle = recorded_idle_saving(analysis, costs)
-        night = 0.0 if idle is None else idle.left_alone
-        shifts = yearly_money(price.value, costs.currency)
+        shown = yearly_money(price.value, costs.currency)
         style = PLANNED_STYLE if analysis.program is None else "driven"
-        pieces = (
-            Piece(style, "in shifts", price.value),
-            Piece(f"{style} night", "at night and at weekends", night),
-        )
-        outside = (
-            f", {yearly_money(night, costs.currency)} outside on closed brakes"
-            if night > 0.0
-            else ""
-        )
-        notes = (f"{shifts} in shifts{outside}, {origin_of(cycle)}",)
-        whisker = (price.low + night, price.high + night)
-        total = yearly_money(price.value + night, costs.currency)
-        rows.append(Row(name, pieces if night > 0.0 else pieces[:1], total, notes, whisker=whisker))
+        pieces = (Piece(style, "in shifts", price.value),)
+        notes = (f"in shifts, {origin_of(cycle)}",)
+        rows.append(Row(name, pieces, shown, notes, whisker=(price.low, price.high)))
     return bars(rows, "a year of such cycles") if len(rows) > 1 else ""
 
 

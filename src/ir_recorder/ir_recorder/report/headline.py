@@ -278,13 +278,19 @@ def _without_saving(analysis: Analysis, cycle: Production, paid: Paid, costs: Co
     origin = f"{name}." if cycle.origin in cycle.name else f"{name}, {cycle.origin}."
     limit = f"{cycle.supply[0].upper()}{cycle.supply[1:]}." if cycle.supply else ""
     return Answer(
-        *year_in_words(energy, paid.idle, taken, costs),
+        *year_in_words(energy, paid.idle, taken, costs, planned=analysis.program is None),
         [each for each in (origin, beside, limit, _nights_rest_on(paid.idle)) if each],
         do,
         [f"Parts: {part}", *a_night(paid.idle, costs)],
-        between_of(energy.of(costs.money), costs),
+        _between_shifts(energy, paid.idle, costs),
         counted=counted_at(costs),
     )
+
+
+def _between_shifts(energy: Amount, idle: IdleSaving | None, costs: Costs) -> str:
+    """The 90 % interval of a year of energy [J] in shifts; "" without one."""
+    between = between_of(energy.of(costs.money), costs)
+    return f"in shifts: {between}" if between and idle is not None else between
 
 
 NO_COMPARISON = (
@@ -294,20 +300,24 @@ NO_COMPARISON = (
 
 
 def year_in_words(
-    energy: Amount, idle: IdleSaving | None, taken: str, costs: Costs
+    energy: Amount, idle: IdleSaving | None, taken: str, costs: Costs, *, planned: bool = False
 ) -> tuple[str, str]:
     """What a year of energy [J] in shifts costs, nights and weekends with it where they are known:
-    in a few words, and its parts.
+    in a few words, and its parts. planned: a plan rests in its deepest mode outside of shifts, a
+    robot that was driven on closed brakes.
     """
     shifts = costs.money(energy.value)
     if idle is None:
         nights = "Nights and weekends aren't known" if costs.idle_hours > 0.0 else "No nights"
         return f"{yearly_money(shifts, costs.currency)} a year", f"In shifts: {taken}. {nights}."
-    outside = yearly_money(idle.left_alone, costs.currency)
+    nights, how = (
+        (idle.deepest, f"in {idle.mode}") if planned else (idle.left_alone, "on closed brakes")
+    )
+    outside = yearly_money(nights, costs.currency)
     return (
-        f"{yearly_money(shifts + idle.left_alone, costs.currency)} a year",
+        f"{yearly_money(shifts + nights, costs.currency)} a year",
         f"{yearly_money(shifts, costs.currency)} in shifts ({taken}), {outside} at night and at "
-        "weekends, on closed brakes.",
+        f"weekends, {how}.",
     )
 
 

@@ -258,9 +258,11 @@ class Paid:
         name, energy = self.driven
         idle = self.idle
         shifts = costs.money(energy)
+        style = "today" if name == PLANNED else "driven"
+        how = f"in {idle.mode}"
         return [
-            _year_row(name, "driven", (shifts, idle.left_alone), costs, ON_BRAKES),
-            _year_row(f"with {idle.mode} at night", "planned", (shifts, idle.deepest), costs),
+            _year_row(name, style, (shifts, idle.left_alone), costs, ON_BRAKES),
+            _year_row(name, "planned", (shifts, idle.deepest), costs, how),
             _saved_row(LEFT, idle.money, idle.saved, costs),
         ]
 
@@ -401,15 +403,18 @@ def _year_row(
     style: str,
     money: tuple[float, float],
     costs: Costs,
-    rests: str = "",
+    rests: str,
 ) -> Row:
-    """A bar of a year: money in shifts, and outside of them; rests: how, in words."""
+    """A bar of a year: money in shifts, and outside of them; rests: how, in words, which belongs
+    to the name, as the same program with other nights is another year.
+    """
     shifts, nights = (yearly_money(each, costs.currency) for each in money)
     pieces = [Piece(style, "in shifts", money[0])]
     parts = ""
     if money[1] > 0.0:
         pieces.append(Piece(f"{style} night", "at night and at weekends", money[1]))
-        parts = f"{shifts} in shifts, {nights} outside {rests}".rstrip()
+        parts = f"{shifts} in shifts, {nights} outside"
+        name = f"{name}, nights {rests}"
     price = yearly_money(sum(money), costs.currency)
     return Row(name, tuple(pieces), price, (parts,))
 
