@@ -23,8 +23,10 @@ from ir_planner import Planner
 from ir_studies import LayoutSettings, Means, run_layout
 from ir_studies.errors import StoppedError, StudyError
 from ir_studies.layout import Layouts, search
+from ir_studies.layout.placement import Placement
 from ir_studies.layout.search import points
 from ir_studies.layout.settings import read_layout
+from ir_studies.layout.summary import Final
 from ir_studies.work.results import NAME
 
 WORKER = Path(__file__).with_name("fake_layout_worker.py")
@@ -149,6 +151,7 @@ import sys
 sys.path[:0] = {path!r}
 from ir_studies import Means, run_layout
 from ir_studies.layout.settings import read_layout
+from ir_studies.layout.summary import Final
 from ir_studies.errors import StudyError
 try:
     run_layout(read_layout({settings!r}), {folder!r}, Means(1, command={command!r}))
@@ -214,6 +217,23 @@ def test_the_placement_as_given_is_the_program_that_a_plan_has() -> None:
     plan = Planner("open", clock=lambda: 0.0).plan_program(stations=stations)
     assert row["energy_j"] == plan.report.energy
     assert row["duration_s"] == plan.report.duration
+
+
+def test_a_year_of_a_layout_has_the_cycles_that_a_plan_of_it_has() -> None:
+    """5 829 cycles on the page of a layout, of its own time, and 5 818 on that of its plan, of the
+    common program's.
+    """
+    stations = ("p1", "home")
+    settings = LayoutSettings(cell="open", stations=stations, base={"x": (-0.1, 0.1)})
+    words = {"stage": "plan", "values": {}, "payload": {}, "cycle_time": 0.0, "seed": 0}
+    made = search.maker({**settings.budget, "cell_yaml": cell_to_yaml(load_cell("open"))})
+    own, given = made(words), made({**words, "robots": True})
+    plan = Planner("open", clock=lambda: 0.0).plan_program(stations=stations, savings=True)
+    final = Final(Placement({}), settings.conditions[0], (given,))
+    assert final.pace == plan.savings.total.seconds != plan.report.duration
+    assert {name: given[name] for name in own} == own  # the program is the same
+    moved = made({**words, "values": {"base.x": 0.1}, "robots": True})
+    assert "common_s" not in moved  # its cycles are those of the given one
 
 
 def test_only_the_given_placement(laid: Laid) -> None:

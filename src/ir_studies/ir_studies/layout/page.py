@@ -287,10 +287,10 @@ _HEADS = (
 
 _ZERO = "the planned program of the layout as given"
 _APART = (
-    "Plans and comparisons are held against the common program (the same stations by PTP at 100 %) "
-    "and count its cycles; what the plan itself saves comes on top."
+    "A year has as many cycles as on the page of its plan; what a plan saves against the common "
+    "program (the same stations by PTP at 100 %) comes on top."
 )
-"""What a layout is held against, and why its money is another than that of a plan's page."""
+"""What a layout is held against, and what its money leaves out that a plan's page has."""
 
 
 def write_page(
@@ -326,6 +326,7 @@ def page_html(
     parts = {
         "tiles": _tiles(known, finals),
         "bars": _bars(finals, costs),
+        "places": _places(finals),
         "assumed": assumed_section(costs),
         "searched": f"<ul>{said}</ul>",
         "best": table(_HEADS, _rows(finals, costs), "The best placements"),
@@ -435,8 +436,8 @@ def _at_limits(one: Final, settings: LayoutSettings) -> str:
 
 @dataclass(frozen=True)
 class _Year:
-    """What a placement saves of the given one: joules of a cycle, and money of a year of the given
-    one's cycles.
+    """What a placement saves of the given one: joules of a cycle, and money of a year of as many
+    cycles as its common program makes.
     """
 
     energy: Amount
@@ -446,7 +447,7 @@ class _Year:
 def _year(one: Final, like: Final, costs: Costs) -> _Year:
     less, within = one.saving(like)
     energy = Amount(less, within.low, within.high)
-    cycles = costs.cycles_per_year(like.mean("duration_s"))
+    cycles = costs.cycles_per_year(like.pace)
     return _Year(energy, energy.times(cycles).of(costs.money))
 
 
@@ -480,11 +481,7 @@ def _bars(finals: Sequence[Sequence[Final]], costs: Costs) -> str:
             price = yearly_money(year.money.value, costs.currency)
             between = yearly_span(year.money.low, year.money.high, costs.currency)
             name = f"placement {rank}"
-            first = one is own[0]
-            notes = (
-                f"{between} {costs.currency}; {kilowatt_hours(year.energy.value)} a cycle",
-                *(_moved(one) if first else ()),
-            )
+            notes = (f"{between} {costs.currency}; {kilowatt_hours(year.energy.value)} a cycle",)
             style = "planned" if year.money.value >= 0.0 else "today"
             rows.append(
                 Row(
@@ -498,13 +495,12 @@ def _bars(finals: Sequence[Sequence[Final]], costs: Costs) -> str:
     if not rows:
         return ""
     like = given[0]
-    pace = like.mean("duration_s")
+    pace = like.pace
     cost = costs.money(like.mean() * costs.cycles_per_year(pace))
     hint = (
         f"Zero is {_ZERO}: {kilowatt_hours(like.mean())} a cycle, "
         f"{yearly_money(cost, costs.currency)} a year in shifts of {cycles_of_year(pace, costs)}, "
-        f"which all placements make. {_APART} Right of it a placement saves. Whisker: 90 % "
-        "interval of the difference. Small: what stands how far from where it is given."
+        "which all placements make. Right of it a placement saves. Whisker: 90 % interval."
     )
     drawn = bars(rows, "saved a year")
     return f'{drawn}<p class="hint">{text(hint)} {counted_with(costs)}</p>'
@@ -564,16 +560,33 @@ def _briefly(sentence: str, finals: Sequence[Sequence[Final]]) -> str:
     return sentence.replace(best[0].placement.key, "best_1.yaml") if best else sentence
 
 
-def _moved(one: Final) -> list[str]:
-    """What stands how far from where it is given, a line for each."""
+def _places(finals: Sequence[Sequence[Final]]) -> str:
+    """A table of the best placements: what stands how far from where it is given; "" without
+    one.
+    """
+    others = [own[0] for own in finals if not own[0].is_given and own[0].solved]
+    moved = [_moved(one) for one in others]
+    owners = list(dict.fromkeys(owner for own in moved for owner in own))
+    if not owners:
+        return ""
+    rows = [
+        (f"<b>{rank}</b>", *(text(own.get(owner, "as given")) for owner in owners))
+        for rank, own in enumerate(moved, start=1)
+    ]
+    heads = ("placement", *owners)
+    return table(heads, rows, "What stands how far from where it is given")
+
+
+def _moved(one: Final) -> dict[str, str]:
+    """What stands how far from where it is given, by owner."""
     by: dict[str, list[str]] = {}
     for name, value in sorted(one.placement.values.items()):
         owner, _, part = name.removeprefix(_MACHINE).rpartition(".")
-        unit = "°" if part.endswith("_deg") else " m"
-        shown = f"{part.removesuffix('_deg')} {value:+g}{unit}"
+        amount = f"{value:+g}°" if part.endswith("_deg") else f"{100.0 * value:+.4g}\u202fcm"
+        shown = f"{part.removesuffix('_deg')}\u202f{amount}"
         if value:
             by.setdefault(owner, []).append(shown)
-    return [f"{owner}: {', '.join(own)}" for owner, own in by.items()]
+    return {owner: ", ".join(own) for owner, own in by.items()}
 
 
 def _rows(finals: Sequence[Sequence[Final]], costs: Costs) -> Iterator[tuple[str, ...]]:

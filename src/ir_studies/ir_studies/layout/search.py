@@ -264,11 +264,15 @@ class Maker:
         cycle = float(words["cycle_time"])
         objective = "energy" if cycle > 0.0 else "time_and_energy"
         request = self._request(cell, PlanOptions(objective=objective, seed=words["seed"]), cycle)
+        if words.get("robots") and not words["values"]:
+            request = replace(request, savings=True)  # what a year of the given one is made of
         plan = plan_program(request, work_of(request))
         if not plan.status.ok:
             return refused(plan.status)
         spreads = Spreads(request)
         row = figures(with_intervals(plan, spreads), self._budget["time_value"], cycle)
+        if plan.savings.available:
+            row["common_s"] = plan.savings.total.seconds
         if words.get("robots"):
             row["robots"] = [
                 round(float(one), 3) for one in np.sum(spreads.of(plan.movements), axis=0)

@@ -49,6 +49,13 @@ class Final:
         return self.placement.key == GIVEN.key
 
     @property
+    def pace(self) -> float:
+        """From one cycle to the next [s]: of the given placement as on the page of its plan, which
+        counts as many as its common program makes; elsewhere its own.
+        """
+        return float(self.rows[0].get("common_s", self.mean("duration_s")))
+
+    @property
     def robots(self) -> np.ndarray:
         """What the drawn robots add (ROBOTS,) to its joules."""
         return np.array(self.rows[0]["robots"])
