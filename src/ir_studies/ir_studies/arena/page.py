@@ -22,7 +22,6 @@ from ir_recorder.report.files import write_output
 from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import DASH, joules, millimetres, percent, seconds, text
 from ir_recorder.report.page import PAGE_START, asset
-from ir_recorder.report.paid import Tile, row_of
 from ir_recorder.report.series import Curves, Json, packed
 from ir_recorder.report.shapes import body_mesh, capsule_mesh
 from ir_recorder.report.tables import COMPACT, bar, table
@@ -113,7 +112,6 @@ _HEADS = (
     "planner", ">solved", ">first answer", ">best answer", ">cost above the best", ">movement cost above the least",  # noqa: E501
     ">duration", ">energy", ">clearance", ">lost",
 )  # fmt: skip
-_NAMED = 3  # planners, of those that are alike
 _TIE = 1e-3  # of the cost: less is no difference to anybody
 _CHANCE = 1.0 - LEVEL  # a difference that is as likely by chance is not shown
 # percent: what a curve of costs shows where nothing, or something more expensive, is known
@@ -146,7 +144,6 @@ def page_html(runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int = 
     )
     parts = {
         "time_value": _second(settings.time_value),
-        "tiles": row_of(_tiles(ranking)) if ranking is not None else "",
         "ranking": _ranking_table(ranking) if ranking is not None else "",
         "verdict": verdict(runs, settings),
         "shown": _shown(runs, shown),
@@ -178,10 +175,13 @@ class _Ranking:
     found: Mapping[str, Figures]
     questions: int
 
-    def best(self, of: Callable[[Figures], float]) -> list[Figures]:
-        """Those that solved as many as the winner, by a figure, the least first."""
+    @property
+    def soonest(self) -> Figures:
+        """Of those that solved as many as the winner who has the soonest first answer."""
         most = self.found[self.winner].solved
-        return sorted((one for one in self.found.values() if one.solved == most), key=of)
+        return min(
+            (one for one in self.found.values() if one.solved == most), key=lambda one: one.first
+        )
 
 
 def _ranked(runs: Sequence[ArenaRun], settings: ArenaSettings) -> _Ranking | None:
@@ -212,29 +212,39 @@ def _differs(other: Against) -> str:
 def _ranking_table(ranking: _Ranking) -> str:
     """Every planner: what it solved, its cost and its first answer against the winner's."""
     mine = ranking.found[ranking.winner]
+    soonest = ranking.soonest
     rows = [
         (
             f"<b>{_breakable(mine.planner)}</b><small>first</small>",
             f"<b>{mine.solved}</b> of {mine.count}",
             bar(mine.success, 1.0, "planned"),
             DASH,
-            milliseconds(mine.first),
+            _first(mine, soonest),
         )
     ]
     for other in ranking.others:
         own = ranking.found[other.planner]
         rows.append(
             (
-                f"{_breakable(own.planner)}<small>{_differs(other) or 'no difference'}</small>",
+                f"{_breakable(own.planner)}<small>{_differs(other) or _ALIKE}</small>",
                 f"<b>{own.solved}</b> of {own.count}",
                 bar(own.success, 1.0, ""),
                 _with_ends(other.cost),
-                milliseconds(own.first),
+                _first(own, soonest),
             )
         )
     against_it = f">cost against {ranking.winner}"
     heads = ("planner", ">solved", "", against_it, ">first answer")
     return table(heads, rows, "Who wins", COMPACT)
+
+
+_ALIKE = "not shown to differ"
+
+
+def _first(own: Figures, soonest: Figures) -> str:
+    """The first answer of a planner, in bold where none of those that solved most is sooner."""
+    shown = milliseconds(own.first)
+    return f"<b>{shown}</b>" if own is soonest else shown
 
 
 def _breakable(name: str) -> str:
@@ -310,8 +320,7 @@ def _answer(
     best = ranking.found[ranking.winner]
     words = (
         f"{best.planner} solved most, {best.solved} of {best.count} runs, and of those that solved "
-        f"as many its trajectories cost least: {100.0 * (best.cost_ratio - 1.0):.2f} % above the "
-        f"best known in the median. {counted(len(settings.planners), 'planner')} had "
+        f"as many its trajectories cost least. {counted(len(settings.planners), 'planner')} had "
         f"{settings.seconds:g} s of processor for each of "
         f"{counted(ranking.questions, 'movement')}{_left_out(runs)}."
     )
@@ -453,49 +462,6 @@ def verdict(runs: Sequence[ArenaRun], settings: ArenaSettings) -> str:
     items = "".join(f"<li>{text(words)}</li>" for words in behind(runs, settings))
     head = f"Where another one is ahead of the {PORTFOLIO}"
     return f'<section id="verdict"><h2>{head}</h2><ul>{items}</ul></section>' if items else ""
-
-
-def _tiles(ranking: _Ranking) -> list[Tile]:
-    """Who wins at what: most solved, least cost and soonest answer, each with who comes next."""
-    winner = ranking.found[ranking.winner]
-    best = ranking.best(lambda one: one.cost_ratio)
-    soonest = ranking.best(lambda one: one.first)
-    fewer = [one for one in ranking.found.values() if one.solved < winner.solved]
-    after = max(fewer, key=lambda one: one.solved, default=None)
-    among = "of those that solved most"
-    return [
-        Tile(
-            "solved most",
-            _names(best),
-            (
-                f"{winner.solved} of {winner.count} runs",
-                f"next: {after.planner}, {after.solved}" if after is not None else "all alike",
-            ),
-        ),
-        _first(
-            f"least cost, {among}",
-            best,
-            lambda one: percent(one.cost_ratio - 1.0),
-            " against the best known, median",
-        ),
-        _first(
-            f"soonest first answer, {among}",
-            soonest,
-            lambda one: milliseconds(one.first),
-            ", median",
-        ),
-    ]
-
-
-def _first(head: str, ranked: Sequence[Figures], figure: Callable[[Figures], str], of: str) -> Tile:
-    """The first of some planners with its figure, and the next."""
-    after = f"next: {ranked[1].planner}, {figure(ranked[1])}" if len(ranked) > 1 else ""
-    return Tile(head, ranked[0].planner, (f"{figure(ranked[0])}{of}", after))
-
-
-def _names(found: Sequence[Figures]) -> str:
-    more = f" and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
-    return f"{', '.join(one.planner for one in found[:_NAMED])}{more}"
 
 
 def _against(own: Sequence[ArenaRun], place: str, settings: ArenaSettings) -> Iterator[str]:
