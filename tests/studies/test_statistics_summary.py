@@ -107,7 +107,7 @@ def test_the_page_says_first_how_far_the_prediction_is_off(
     assert bool(answer) == bool(shares)
     if shares:
         assert f"of {2 * len(shares)} simulated ones lie in the predicted 90 % interval" in answer
-        assert page.index(answer) < page.index('class="tile"')
+        assert page.index(answer) < page.index('class="dots"')
         assert "intervals begin at the prediction" in answer
 
 

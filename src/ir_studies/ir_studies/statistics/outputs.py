@@ -15,7 +15,6 @@ from ir_recorder.report.files import write_output
 from ir_recorder.report.methods import counted
 from ir_recorder.report.number_text import DASH, significant, text
 from ir_recorder.report.page import PAGE_START, folded
-from ir_recorder.report.paid import Tile, row_of
 from ir_recorder.report.shell import SIMULATED, source_badge
 from ir_recorder.report.step_table import write_columns
 from ir_recorder.report.tables import table
@@ -28,8 +27,9 @@ from ir_values.files import ANYWHERE
 # Drawing of paired comparisons: a dot per pair, a bar for the interval of the mean.
 
 WIDTH = 420.0  # as narrow as a telephone, so that its letters stay readable there
-LINE = 30.0
+LINE = 34.0
 _LETTER = 7.6  # of a name in bold, on average
+_DIGIT = 5.9  # of a figure below a name, on average
 _GAP = 26.0  # between names and axis: half of the first tick's words
 _RIGHT = 26.0
 _WORDS = 28.0  # more, for what is said beside an arrow
@@ -51,7 +51,9 @@ def dots(comparisons: Sequence[Comparison], title: str) -> str:
     high = last * step
     height = _TOP + LINE * len(kept) + _BOTTOM
     every = np.concatenate([each.values for each in kept])
-    left = _LETTER * max(len(each.name) for each in kept) + _GAP + _WORDS * bool(every.min() < low)
+    names = max(_LETTER * len(each.name) for each in kept)
+    left = max(names, *(_DIGIT * len(_said(each)) for each in kept)) + _GAP
+    left += _WORDS * bool(every.min() < low)
     right = WIDTH - _RIGHT - _WORDS * bool(every.max() > high)
 
     def at(value: float) -> float:
@@ -101,6 +103,12 @@ def _tick(percent: float) -> str:
     return f"{percent:+g}" if percent else "0"
 
 
+def _said(each: Comparison) -> str:
+    """The difference of the sums with its interval."""
+    value = f"{percent(each.mean.value)} %"
+    return f"{value} ({_interval(each.mean)})" if math.isfinite(each.mean.low) else value
+
+
 def _line(each: Comparison, top: float, at: Callable[[float], float]) -> str:
     y = top + LINE / 2.0
     marks = "".join(
@@ -109,7 +117,11 @@ def _line(each: Comparison, top: float, at: Callable[[float], float]) -> str:
         if not _beyond(value, at)
     )
     marks += "".join(_arrow(each.values.tolist(), way, y, at) for way in (-1, 1))
-    label = f'<text class="name" x="0" y="{y + 4.0:.1f}">{text(each.name)}</text>'
+    figure = "figure shown" if each.shown else "figure"
+    label = (
+        f'<text class="name" x="0" y="{y - 1.0:.1f}">{text(each.name)}</text>'
+        f'<text class="{figure}" x="0" y="{y + 11.0:.1f}">{text(_said(each))}</text>'
+    )
     middle = at(each.mean.value)
     ends = f'y1="{y - _BAR / 2.0:.1f}" y2="{y + _BAR / 2.0:.1f}"'
     marks += f'<line class="mean" x1="{middle:.1f}" x2="{middle:.1f}" {ends}/>'
@@ -189,7 +201,6 @@ _PORTFOLIO_RULE = (
     "predicted: a rule, no finding."
 )
 _ONE_ROBOT = f"One robot says little of the predicted interval; plant: {DRAWN} draws one per pair."
-_FIRST = ("duration", "energy, direct", "predicted against direct")
 """Comparisons that people look for first."""
 _SCOPE = (
     "Energies are at the mains, controller and tool included, of simulated robots; nothing "
@@ -331,7 +342,7 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
     varied = [each for each in found.comparisons if not each.count or each.less + each.more]
     same = [each.name for each in found.comparisons if each not in varied]
     head = Head(
-        "Predicted energies, held against simulated ones",
+        "Predicted and simulated energy",
         f"{settings.cell}: {found.pairs} random pairs of places, planner "
         f"{settings.planner or 'portfolio'}, objective {settings.objective.replace('_', ' ')}",
         _answer(found),
@@ -339,10 +350,7 @@ def page_html(found: Findings, settings: StatisticsSettings) -> str:
         source_badge(SIMULATED, "simulated", _robot(settings)),
     )
     parts = {
-        "tiles": row_of(_tiles(found)),
         "counts": table(("", ">how many"), [(text(a), b) for a, b in counts(found)], "Counts"),
-        "timings": text(_timings(found)),
-        "predicted": text(_predicted(found)[0] or "Nothing was driven"),
         "notes": "".join(f"<li>{text(note)}</li>" for note in notes(found, settings)),
         "alike": text(f"Alike in all pairs: {', '.join(same)}." if same else ""),
         "comparisons": _table(
@@ -495,25 +503,6 @@ def _one_sided(found: Findings) -> str:
         f"; {round(found.upwards * found.driven)} intervals begin at the prediction, as losses can "
         "only add to the data sheet"
     )
-
-
-def _tiles(found: Findings) -> list[Tile]:
-    """What people ask first: how many pairs, what asynchronous joints change, how true energies
-    are.
-    """
-    compared = found.solved - found.same
-    both = f"{found.solved} with both timings certified"
-    alike = f"{found.same} left out: both timings move alike" if found.same else ""
-    tiles = []
-    timing = "asynchronous against synchronous"
-    for each in (*found.agreements, *found.comparisons):
-        if not math.isfinite(each.mean.value) or each.name not in _FIRST:
-            continue
-        within = f"90 % interval {_interval(each.mean)} %" if math.isfinite(each.mean.low) else ""
-        of = timing if each in found.comparisons else "of a movement's energy"
-        verdict = "" if each.shown else "not shown once all rows count together (Holm)"
-        tiles.append(Tile(each.name, f"{percent(each.mean.value)} %", (within, of, verdict)))
-    return [*tiles, Tile("pairs compared", f"{compared} of {found.pairs}", (both, alike))]
 
 
 def summed_up(found: Findings) -> str:
