@@ -23,7 +23,7 @@ import pytest
 from ir_cli.ros.demo import DemoOutcome
 from ir_msgs.msg import PlannedMovement
 from ir_msgs_py.modes import Mode
-from ir_recorder import Analysis, analyse, findings, read_recording
+from ir_recorder import Analysis, Finding, analyse, findings, read_recording
 from ir_recorder.analysis.production import Production, demand_watts, levers, production_of
 from ir_recorder.analysis.tending import Span
 from ir_recorder.report import report_html, robots
@@ -350,6 +350,17 @@ def test_the_terminal_says_what_the_pages_show(walked: Analysis) -> None:
         joules, (walked.savings.total.planned, walked.savings.total.common), strict=True
     ):
         assert figure.shows(exact), total
+
+
+def test_the_page_of_robots_names_at_its_top_what_holds_between_them(walked: Analysis) -> None:
+    """A sentence listed all 302 checks of both robots: six sheets of A4."""
+    between = Finding("distance of left and right", 0.9, 0.0, 2.0, "m", "", 0.0)
+    own = [replace(each, name=f"left: {each.name}") for each in findings(walked)]
+    page = READ.plain(robots_html({"left": walked, "right": walked}, [between, *own]))
+    sure = page.split('<div class="sure">')[1].partition("</div>")[0]
+    assert "distance of left and right 900.0 mm" in sure
+    assert "left: " not in sure
+    assert all(f"left: {each.name}".split()[1] in page for each in findings(walked))
 
 
 @pytest.mark.parametrize("late", [0.0, 1.0])

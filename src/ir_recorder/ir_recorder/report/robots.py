@@ -113,8 +113,7 @@ def _answer(
     every = analyses.values()
     driven = sum(map(driven_joules, every))
     predicted = sum(map(predicted_joules, every))
-    found = ", ".join(f"{check.name} {number(check.measured, check.unit)}" for check in checks)
-    sure = [f"{checked(checks)[1].capitalize()}: {found}."]
+    sure = [_sentence_of(checks, analyses)]
     if predicted > 0.0:
         sure.insert(
             0,
@@ -134,12 +133,29 @@ def _answer(
     rest = [f"What nights save is {idle.basis}."] if idle is not None else []
     return Answer(
         result,
-        f"All {len(analyses)} robots: {words}",
+        f"{_ALL.get(len(analyses), f'All {len(analyses)} robots')}: {words}",
         [*sure, *rest],
         _to_do(analyses, cycle, costs),
         [each, *a_night(idle, costs)],
         counted=counted_at(costs),
     )
+
+
+_ALL = {1: "One robot", 2: "Both robots"}
+
+
+def _sentence_of(checks: Sequence[Finding], analyses: Mapping[str, Analysis]) -> str:
+    """The verdict over all checks, with what was found between the robots: those of a robot, whose
+    names begin with it, stand on its own page.
+    """
+    between = [check for check in checks if check.name.partition(":")[0] not in analyses]
+    found = ", ".join(f"{each.name} {number(each.measured, each.unit)}" for each in between)
+    kind = checked(checks)[1]
+    words = f"{kind[0].upper()}{kind[1:]}"
+    return f"{words}; {found}." if 0 < len(between) <= _SAID else f"{words}."
+
+
+_SAID = 4  # checks between robots, in a sentence: more stand in their table
 
 
 def _picture(analyses: Mapping[str, Analysis], cycle: Production | None, costs: Costs) -> str:
