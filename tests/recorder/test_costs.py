@@ -344,7 +344,7 @@ def test_a_fleet_counts_the_same_robots_in_shifts_and_at_night(
     nights = 2.0 * idle.left_alone
     assert f"<b>{yearly_money(shifts + nights, 'EUR')}</b>" in picture
     assert "second alike in all: no file says what its plan saves" in picture
-    driven = picture.partition("today: as driven")[2]
+    driven = picture.partition(">today, nights")[2]
     assert f"{yearly_money(nights, 'EUR')} outside" in driven  # nobody recorded a night
     assert "of the saving is at night, from the data sheet" in page
     assert "Simulated, not measured" in page

@@ -151,6 +151,7 @@ def _answer(analyses: Sequence[Analysis], names: Sequence[str], costs: Costs) ->
     if len(known) < len(cycles) or not alike:
         why = "What a year costs is not known of each, or not of the same supply."
         return Answer("No program is shown to cost least", why, counted=counted_at(costs))
+    driven = [name for name, one in zip(names, analyses, strict=True) if one.program is not None]
     first = known[names[0]]
     least = min(known, key=lambda name: known[name].value)
     said = [f"{name} {yearly_money(known[name].value, costs.currency)}" for name in names[:_NAMED]]
@@ -171,8 +172,11 @@ def _answer(analyses: Sequence[Analysis], names: Sequence[str], costs: Costs) ->
         less = yearly_money(first.value - known[least].value, costs.currency)
         result = f"{least}: {less} less a year"
         do.append(f"Drive {least}.")
-    elif len(names) == _BESIDE and analyses[0].program is not analyses[1].program is None:
-        result = "The plan predicts the run"
+    elif len(names) == _BESIDE and len(driven) == 1:
+        (run,) = driven
+        (plan,) = (name for name in names if name != run)
+        off = percent(known[run].value / known[plan].value - 1.0)
+        result = f"The run costs what its plan predicts, {off}"
         do.append("In shifts: nothing, both cost alike.")
     else:
         result = f"None is shown to cost less than {names[0]}"
@@ -233,12 +237,12 @@ def _paid(compared: Sequence[Compared], names: Sequence[str], costs: Costs) -> s
     cycles = [production_of(analysis) for analysis in analyses]
     first = None if _apart(analyses) else cycles[0]
     rows = [
-        ("plant", *(text(plant_of(a)) for a, _ in compared)),
-        ("checks", *(text(checked(checks, a)[1]) for a, checks in compared)),
         ("a year of such cycles", *(_year(cycle, first, costs) for cycle in cycles)),
         ("saved by its plan, a year", *(_year_saved(cycle, costs) for cycle in cycles)),
         *_around_the_clock(analyses, cycles, costs),
         ("a cycle", *(_cycle(cycle) for cycle in cycles)),
+        ("plant", *(text(plant_of(a)) for a, _ in compared)),
+        ("checks", *(text(checked(checks, a)[1]) for a, checks in compared)),
     ]
     hint = (
         "A year is one cycle after the other in shifts, pauses at full length, without nights and "

@@ -712,7 +712,8 @@ def _paid(members: Sequence[Member], costs: Costs) -> Paid:
         of += f", {_names(without)} alike in all: no file says what its plan saves"
     common = sum(robot.before for robot in robots)
     driven = [robot.reached for robot in robots if robot.reached is not None]
-    now = (f"today: {_as_now(robots)}", sum_of([robot.now for robot in robots]).value)
+    of += f"; today: {_as_now(robots)}" if driven else ""
+    now = ("today", sum_of([robot.now for robot in robots]).value)
     return Paid(
         saved,
         common,

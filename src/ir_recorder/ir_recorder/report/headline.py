@@ -28,7 +28,6 @@ from ir_recorder.reading.recording import Recording
 from ir_recorder.report.answer import Answer
 from ir_recorder.report.costs import (
     COMMON,
-    NAMES,
     PLANNED,
     Costs,
     IdleSaving,
@@ -504,14 +503,9 @@ def yearly_tile(cycle: Production, costs: Costs) -> Tile:
     """What a year of such cycles costs in the shifts."""
     energy = costs.energy_of_year(cycle).value
     co2 = f"{kilowatt_hours(energy)}, {kilograms(costs.co2(energy))} CO2"
-    assumed = (
-        "prices and shifts assumed"
-        if set(costs.given) != set(NAMES)
-        else "prices and shifts as given"
-    )
     price = yearly_money(costs.money(energy), costs.currency)
-    made = f"{cycles_of_year(cycle.pace, costs)} in shifts, without nights and weekends"
-    lines = (made, co2, assumed, computed_words(cycle), cycle.supply)
+    made = cycles_of_year(cycle.pace, costs)
+    lines = (made, co2, computed_words(cycle), cycle.supply)
     how = "planned" if cycle.origin == PREDICTED else "as driven"
     return Tile(f"costs a year in shifts, {how}", price, lines)
 
