@@ -309,12 +309,12 @@ def year_in_words(
     if idle is None:
         nights = "Nights and weekends aren't known" if costs.idle_hours > 0.0 else "No nights"
         return f"{yearly_money(shifts, costs.currency)} a year", f"In shifts: {taken}. {nights}."
-    nights, how = (
+    rest, how = (
         (idle.deepest, f"in {idle.mode}") if planned else (idle.left_alone, "on closed brakes")
     )
-    outside = yearly_money(nights, costs.currency)
+    outside = yearly_money(rest, costs.currency)
     return (
-        f"{yearly_money(shifts + nights, costs.currency)} a year",
+        f"{yearly_money(shifts + rest, costs.currency)} a year",
         f"{yearly_money(shifts, costs.currency)} in shifts ({taken}), {outside} at night and at "
         f"weekends, {how}.",
     )
