@@ -44,7 +44,8 @@ def test_pauses_are_shortened_with_a_fact_that_says_so_and_real_ones_are_the_pro
     real = Demonstration("demo", tmp_path, 0, "nominal", Progress(), real_pauses=True)
     assert pauses(real) == full
     facts = [fact.partition("=")[0] for fact in real._facts()]
-    assert facts == ["seed", "plant", "safety_distance"]
+    assert facts == ["seed", "plant", "safety_distance", "modes_at_rest"]
+    assert "modes_at_rest=8" in real._facts()  # four modes, with the tool and without
 
 
 @pytest.mark.parametrize("stage", ["_plan", "_tour", "_drive"])
