@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from _measured_levels import repeated
 from _measured_phases import CLEAN, outcomes
 from _measured_robots import kr300_r2500, tx40, ur3e
 from _measured_spoilt import AS_IT_IS, OUTCOMES, ROBOTS, verdicts
@@ -410,12 +411,34 @@ def _kr300(folder: Path, what: str, deviation: float) -> tuple[list[Row], list[C
             whole = Estimate([runs[r] for r in both], both, model, prior, motors=True)
             rows += _split(estimate, whole, f"KR 300, {what}", f"{known} to {run}")
     work = rows[::2]
+    _print_levels(f"KR 300, {what}", Estimate(list(runs.values()), RUNS, model, prior, motors=True))
     worst = max(abs(row.fit) for row in work)
     better = max(abs(row.fit) - abs(row.sheet) for row in work)
     return rows, [
         at_most(f"KR 300, {what}: work of the motors of an unknown run, worst", worst, "%", 3.0),
         at_most(f"KR 300, {what}: beside the data sheet, worst", better, "%", 0.0),
     ]
+
+
+def _print_levels(data: str, estimate: Estimate) -> None:
+    """What work a predictor misses that has the shape of friction from all recordings, and its
+    level from the others.
+    """
+    for bent in (False, True):
+        found = repeated(estimate, bent=bent)
+        print(
+            line_of(
+                {
+                    "repeats": data,
+                    "friction": "bent" if bent else "straight",
+                    "median %": 100.0 * float(np.median(np.abs(found.errors))),
+                    "largest %": 100.0 * float(np.abs(found.errors).max()),
+                    "lowest level": float(found.levels.min()),
+                    "highest level": float(found.levels.max()),
+                    "spread of axis 1 %": 100.0 * float(found.levels[:, 0].std()),
+                }
+            )
+        )
 
 
 def _split(known: Estimate, whole: Estimate, data: str, name: str) -> tuple[Row, Row]:
@@ -501,6 +524,7 @@ def _ur10e(folder: Path, what: str, names: Sequence[str]) -> tuple[list[Row], li
             ("power, W rms", _rms),
         )
     )
+    _print_levels(f"UR10e, {what}", estimate)
     name = f"UR10e, {what}: work of the motors of a recording left out, median"
     return [median, largest, rms], [
         at_most(f"{name}, beside the data sheet", median.fit / median.sheet, "", 1.0),
