@@ -67,6 +67,7 @@ DRIVER = Rights(
         *(names.POWER_STATE, names.CONTROLLER_STATE, names.CONTROLLER_TIMERS, names.CARRIED_LOAD),
         *(names.PLC_OUTPUTS, names.PLC_INPUTS_IN_FORCE, names.ROBOT_MARKERS, names.STOP_NUMBER),
         *(names.PLANT, names.LOAD_CHECK, names.CONTACTS, names.MACHINE_STATES, names.STOP_LATCHED),
+        names.LAST_RECOVERY,
     ),
     subscribe=(
         *(names.COMMANDED_TRAJECTORY, names.PLC_INPUTS, names.SPEED_SCALING, names.CELL),
@@ -82,7 +83,7 @@ RUNNER = Rights(
     publish=(names.SIGNALS, names.MACHINE_SIGNALS, names.PROGRAM_STATE),
     subscribe=(
         *(names.SIGNALS, names.POWER_STATE, names.CONTROLLER_TIMERS),
-        *(names.STOP_NUMBER, names.STOP_LATCHED),
+        *(names.STOP_NUMBER, names.STOP_LATCHED, names.LAST_RECOVERY),
     ),
     request=(
         *(

@@ -5,13 +5,14 @@ What the middleware says of a client that has gone is raised here by rclpy's own
 
 from __future__ import annotations
 
+import time
 import warnings
 from typing import Any
 
 import pytest
 import rclpy
 from rcl_interfaces.srv import ListParameters
-from rclpy.action import ActionClient, CancelResponse
+from rclpy.action import ActionClient, CancelResponse, GoalResponse
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
@@ -121,7 +122,12 @@ def test_a_client_of_an_action_that_has_gone_ends_no_executor(
 ) -> None:
     """The first response of this kind finds nobody; the next client is served."""
     found_nobody: list[str] = []
-    plain = getattr(_rclpy.ActionServer, kind)
+    owner: Any = _rclpy.ActionServer
+    sender = kind
+    if kind == "send_goal_response":  # a request that is taken with its time is answered aside
+        owner = rclpy_inside.GoalRequests
+        sender = "answer"
+    plain = getattr(owner, sender)
 
     def send(handle: Any, header: Any, response: Any) -> None:
         if found_nobody:
@@ -130,7 +136,7 @@ def test_a_client_of_an_action_that_has_gone_ends_no_executor(
             found_nobody.append(kind)
             gone()
 
-    monkeypatch.setattr(_rclpy.ActionServer, kind, send)
+    monkeypatch.setattr(owner, sender, send)
     server = Server(ros_context)
     try:
         client = ros_executor.run(lambda: ActionClient(ros_node, RunProgram, "/server/run"))
@@ -149,6 +155,38 @@ def test_a_client_of_an_action_that_has_gone_ends_no_executor(
         assert run_and_cancel(ros_executor, ros_node, wait_for) == 3
         assert len(server.asked) == 1 + executed
     finally:
+        server.close()
+
+
+def test_goals_are_taken_with_the_time_at_which_they_were_written(
+    ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any
+) -> None:
+    came: list[int] = []
+    server = BackgroundExecutor(ros_context)
+    node = server.add_node(rclpy.create_node("server", context=ros_context))
+    action = server.run(
+        lambda: RecordedActionServer(
+            node,
+            RunProgram,
+            "~/run",
+            lambda goal: RunProgram.Result(),
+            goal_callback=lambda goal: GoalResponse.REJECT,
+            came=lambda goal_id, sent: came.append(sent),
+        )
+    )
+    client = ros_executor.run(lambda: ActionClient(ros_node, RunProgram, "/server/run"))
+    try:
+        wait_for(client.server_is_ready, what="the action is offered")
+        for _ in range(20):
+            before = time.time_ns()
+            sent = ros_executor.run(lambda: client.send_goal_async(RunProgram.Goal()))
+            wait_for(sent.done, what="the goal is answered")
+            assert not sent.result().accepted
+            assert before <= came[-1] <= time.time_ns()
+        assert len(came) == 20
+    finally:
+        ros_executor.run(client.destroy)
+        server.run(action.destroy)
         server.close()
 
 

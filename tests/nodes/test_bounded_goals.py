@@ -37,7 +37,8 @@ def taken(sent: ExecuteTrajectory.Goal, most: int) -> tuple[Any, str, list[tuple
     kind = ExecuteTrajectory.Impl.SendGoalService.Request
     asked: list[tuple[int, int]] = []
 
-    def admit(points: int, size: int) -> bounded_goals.Admission:
+    def admit(points: int, size: int, sent: int) -> bounded_goals.Admission:
+        assert sent == 0  # a request that no server took has no time
         asked.append((points, size))
         if points > most:
             return bounded_goals.Admission(refusal=f"{points} points")

@@ -6,26 +6,33 @@ from __future__ import annotations
 
 import asyncio
 import threading
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
 import pytest
 import rclpy
 from rclpy.action import ActionClient
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import PlcInputs, PowerMode, PowerState
 from ir_msgs.srv import QueryModes, Recover, SetPlcInput
 from ir_msgs_py import names
+from ir_msgs_py.ros.conversions import time_from_msg
+from ir_msgs_py.ros.rclpy_inside import GoalRequests
 from ir_msgs_py.ros.spinning import BackgroundExecutor
 from ir_msgs_py.ros.testing import PATIENCE
-from ir_msgs_py.ros.topics import ACTION_SERVICES, REQUESTS_WAITING, SERVICE
+from ir_msgs_py.ros.topics import ACTION_SERVICES, LATCHED, REQUESTS_WAITING, SERVICE
 from ir_msgs_py.status import StatusCode
+from ir_sim_driver.errors import RequestRefusedError
 from ir_sim_driver.node import SimDriver
 from ir_sim_driver.node.presses import PlcTopic
 from ir_sim_driver.node.trajectory_actions import Executions
@@ -200,9 +207,87 @@ def test_no_goal_is_taken_after_a_recovery_by_plc_before_those_that_wait_are_ref
             begin = driver.stamp_ns
             wait_for(lambda begin=begin: driver.stamp_ns > begin + 60_000_000, what="levels count")
     wait_for(lambda: not driver.stopped, what="the PLC recovers")
-    assert "stop 1 came after" in node._admit(2, 0).refusal
+    assert "stop 1 came after" in node._admit(2, 0, 0).refusal
     assert node._refuse_waiting()
-    assert node._admit(2, 0).ticket
+    assert node._admit(2, 0, 0).ticket
+
+
+@pytest.mark.parametrize("late", [True, False])
+def test_a_goal_that_comes_long_after_it_was_sent_is_as_old_as_it_is(
+    late: bool,
+    ros_context: Any,
+    ros_executor: Any,
+    ros_node: Any,
+    wait_for: Any,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its first datagram is lost, and its sender's middleware sends it again after a stop and the
+    recovery; what is sent after that is driven.
+    """
+    lost = threading.Event()
+    plain = GoalRequests.take
+
+    def take(requests: GoalRequests, kind: Any, sent: Any) -> Any:
+        return None if lost.is_set() else plain(requests, kind, sent)
+
+    monkeypatch.setattr(GoalRequests, "take", take)
+    parameters = {"cell": "open", "backend": "ideal", "wake_port": 0, "plc.startup_window": 0.0}
+    overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+    node = ros_executor.add_node(SimDriver(context=ros_context, parameter_overrides=overrides))
+    driver = node._driver
+    name = "/ir_sim_driver/execute_trajectory"
+    client = ros_executor.run(
+        lambda: ActionClient(ros_node, ExecuteTrajectory, name, **ACTION_SERVICES)
+    )
+    wait_for(client.server_is_ready, what="the driver is there")
+    recoveries: list[Header] = []
+    ros_executor.run(
+        lambda: ros_node.create_subscription(
+            Header, f"/{names.LAST_RECOVERY}", recoveries.append, LATCHED
+        )
+    )
+    wait_for(lambda: recoveries, what="there was no stop yet")
+    assert time_from_msg(recoveries[0].stamp) == 0
+    path = JointTrajectory(joint_names=list(names.JOINT_NAMES))
+    start = [float(q) for q in np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])]
+    point = JointTrajectoryPoint(positions=[start[0] + 0.1, *start[1:]], velocities=[0.0] * 6)
+    point.time_from_start.sec = 1
+    path.points = [point]
+
+    def send() -> Any:
+        goal = ExecuteTrajectory.Goal(trajectory=path)
+        return ros_executor.run(lambda: client.send_goal_async(goal))
+
+    if late:
+        lost.set()
+        sent = send()
+    for level in (True, False):
+        driver.press("service", "emergency_stop", level)
+        begin = driver.stamp_ns
+        wait_for(lambda begin=begin: driver.stamp_ns > begin + 60_000_000, what="levels count")
+
+    def recovered() -> bool:
+        with suppress(RequestRefusedError):
+            driver.recover()
+        return not driver.stopped
+
+    wait_for(recovered, what="the robot recovers")
+    wait_for(lambda: int(recoveries[-1].frame_id) == driver.stop_number, what="it is told")
+    wait_for(node._refuse_waiting, what="nothing waits")
+    if not late:
+        assert time_from_msg(recoveries[-1].stamp) < time.time_ns()
+        sent = send()
+    lost.clear()
+    wait_for(sent.done, what="the goal is taken")
+    result = ros_executor.run(sent.result().get_result_async)
+    wait_for(result.done, what="the goal ends")
+    client.destroy()
+    outcome = result.result().result
+    if late:
+        assert outcome.error_code == -1
+        assert "s before stop 1 was recovered, by its sender's clock" in outcome.error_string
+    else:
+        assert outcome.error_code == 0, outcome.error_string
 
 
 @pytest.mark.parametrize(

@@ -107,6 +107,18 @@ def execution() -> TrajectoryExecution:
     return TrajectoryExecution(lambda goal, stopped: None, lambda trajectory: None)
 
 
+def test_a_goal_that_was_sent_before_a_recovery_is_canceled_whenever_it_comes(
+    execution: TrajectoryExecution,
+) -> None:
+    execution.hear_recovery(0)
+    before = execution.accept(1000)
+    execution.hear_recovery(2000)
+    assert before.canceled
+    assert execution.accept(1999).canceled
+    assert not execution.accept(2000).canceled
+    assert not execution.accept().canceled  # not known when it was sent
+
+
 def test_goals_of_an_action_server_end_as_they_were_asked_to(
     execution: TrajectoryExecution, ros_executor: Any, ros_node: Any, wait_for: Any
 ) -> None:

@@ -15,7 +15,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import Bool, UInt64
+from std_msgs.msg import Bool, Header, UInt64
 
 from ir_msgs.action import ExecuteTrajectory, RunProgram
 from ir_msgs.msg import PowerState, ProgramState, Status
@@ -27,7 +27,7 @@ from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros import client
 from ir_msgs_py.ros.client import Client
-from ir_msgs_py.ros.conversions import trajectory_to_msg
+from ir_msgs_py.ros.conversions import recovery_to_msg, trajectory_to_msg
 from ir_msgs_py.ros.plan_conversions import planned_movement_to_msg
 from ir_msgs_py.ros.power_conversions import power_mode_to_msg
 from ir_msgs_py.ros.rclpy_inside import PatientActionServer
@@ -69,6 +69,8 @@ class FakeDriver(Node):
         self.stops.publish(UInt64(data=0))
         self.latched = self.create_publisher(Bool, "~/stop_latched", LATCHED)
         self.latched.publish(Bool(data=False))
+        self.recoveries = self.create_publisher(Header, "~/last_recovery", LATCHED)
+        self.recoveries.publish(recovery_to_msg(0, 0))
         self.create_service(SetPlcInput, "~/set_plc_input", self.set_plc_input)
         self.create_service(SetLoad, "~/set_load", self.set_load)
         self.create_service(QueryModes, "~/query_modes", self.query_modes)
@@ -402,9 +404,27 @@ def test_a_program_that_is_asked_for_while_a_stop_is_latched_does_not_wait_for_t
     assert result.status.code == StatusCode.INVALID_ROBOT_STATE
     assert "stop 3 of the driver ended the program: recover" in result.status.message
     assert cell.driver.log == []
+    cell.driver.recoveries.publish(recovery_to_msg(3, time.time_ns()))
     cell.driver.latched.publish(Bool(data=False))
     wait_for(lambda: not cell.runner._driver.stop_latched)
     assert cell.run([move()]).status.code == StatusCode.SUCCESS
+
+
+def test_a_program_that_comes_long_after_it_was_sent_is_as_old_as_it_is(cell, wait_for):
+    """A stop is recovered meanwhile; one whose recovery is not heard of counts as later too."""
+    cell.driver.stops.publish(UInt64(data=1))
+    ahead = time.time_ns() + 3_600_000_000_000
+    for number, recovered in ((1, ahead), (1, 1), (0, 1)):
+        cell.driver.recoveries.publish(recovery_to_msg(number, recovered))
+        wait_for(lambda told=(number, recovered): cell.runner._driver._recovery == told)
+        wait_for(lambda: cell.runner._driver.stops == 1)
+        result = cell.run([move()])
+        if (number, recovered) == (1, 1):
+            assert result.status.code == StatusCode.SUCCESS
+        else:
+            assert result.status.code == StatusCode.INVALID_ROBOT_STATE
+            assert "stop 1 of the driver ended the program" in result.status.message
+    assert cell.driver.log.count("drive") == 1
 
 
 def test_a_pause_lasts_as_long_in_a_plant_that_lags(cell):

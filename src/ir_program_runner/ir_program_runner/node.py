@@ -170,7 +170,7 @@ class ProgramRunnerNode(Node):
         self._waiting = Waiting(self)
         self._planner = PlannerClient(self, self._waiting, links.planner, links.response_timeout)
         self._known_stop: int | None = None
-        self._known_stops = TakenGoals[int | None]()
+        self._known_stops = TakenGoals[tuple[int | None, int]]()
         self._driver = self._link_to_driver(links)
         self._machine_time = MachineTime(self._plant_time, lambda: node_time(self))
         self._jump = ""
@@ -218,9 +218,11 @@ class ProgramRunnerNode(Node):
         if self._known_stop != self._driver.stops and self._server.take_waiting(BURST):
             self._known_stop = self._driver.stops
 
-    def _note_stop(self, goal_id: bytes) -> None:
-        """A goal is taken: note the last stop that its sender can have known."""
-        self._known_stops.note(goal_id, self._known_stop)
+    def _note_stop(self, goal_id: bytes, sent: int) -> None:
+        """A goal is taken: note the last stop that its sender can have known, and when it was sent
+        [ns].
+        """
+        self._known_stops.note(goal_id, (self._known_stop, sent))
 
     def destroy_node(self) -> None:
         """Let go of the action server before the node."""
@@ -239,7 +241,7 @@ class ProgramRunnerNode(Node):
             goal.request.program_id, (), self._driver.plant_time
         )
         goal_id = bytes(goal.goal_id.uuid)
-        after_stop = self._known_stops.pop(goal_id, self._driver.stops)
+        after_stop, sent = self._known_stops.pop(goal_id, (self._driver.stops, 0))
         watch = self._watch_client(goal_id, progress)
         try:
             status, movements = await self._fetch(goal.request)
@@ -247,6 +249,8 @@ class ProgramRunnerNode(Node):
             patience = self._settings.links.value.response_timeout
             await self._waiting.until(self._driver_is_known, patience)
             after_stop = self._driver.stops if after_stop is None else after_stop
+            if self._driver.recovered_after(sent):  # lost on its way, and sent again since
+                after_stop = (self._driver.stops or 1) - 1
             progress.started = self._driver.plant_time
             self._jump = ""
             energy = self._driver.energy
@@ -280,9 +284,10 @@ class ProgramRunnerNode(Node):
         return self.create_timer(_CLIENT_PERIOD, look, clock=steady)
 
     def _driver_is_known(self) -> bool:
-        """Whether the meter and the last stop have been heard, and time passes."""
+        """Whether the meter, the last stop and its recovery have been heard, and time passes."""
         stop = (self._driver.stops, self._driver.stop_latched)
-        return not self._driver.silent and None not in stop and node_time(self) > 0.0
+        known = None not in stop and self._driver.recovery_known
+        return not self._driver.silent and known and node_time(self) > 0.0
 
     async def _run_steps(
         self, goal: ServerGoalHandle, program: Program, after_stop: int | None

@@ -7,6 +7,7 @@ and joint: a quaternion that is no rotation, an unknown frame, times that don't 
 from __future__ import annotations
 
 import math
+import re
 from array import array
 from collections.abc import Mapping, Sequence
 
@@ -14,6 +15,7 @@ import numpy as np
 from builtin_interfaces.msg import Duration, Time
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
 from trajectory_msgs.msg import JointTrajectoryPoint
 
@@ -48,6 +50,18 @@ def time_to_msg(stamp_ns: int) -> Time:
 def time_from_msg(msg: Time) -> int:
     """Stamp as node clock [ns]."""
     return int(msg.sec) * NS_PER_S + int(msg.nanosec)
+
+
+def recovery_to_msg(number: int, recovered_ns: int) -> Header:
+    """When the stop of this number was recovered, by the system's clock [ns]; 0: none came yet."""
+    return Header(stamp=time_to_msg(recovered_ns), frame_id=str(number))
+
+
+def recovery_from_msg(msg: Header) -> tuple[int, int]:
+    """Number of a stop, -1 for none, and when it was recovered [ns]."""
+    text = msg.frame_id
+    number = int(text) if re.fullmatch(r"\d{1,20}", text, re.ASCII) else -1
+    return number, time_from_msg(msg.stamp)
 
 
 def point_to_msg(point: FloatArray) -> Point:

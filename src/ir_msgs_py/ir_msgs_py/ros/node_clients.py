@@ -16,7 +16,7 @@ from action_msgs.msg import GoalStatus
 from rclpy.action import ActionClient
 from rclpy.node import Node
 from rclpy.task import Future
-from std_msgs.msg import Bool, UInt64
+from std_msgs.msg import Bool, Header, UInt64
 
 from ir_msgs.action import ExecuteTrajectory
 from ir_msgs.msg import ControllerTimers as ControllerTimersMsg
@@ -29,6 +29,7 @@ from ir_msgs_py.modes import OFF_THE_NETWORK, Mode, PowerMode
 from ir_msgs_py.names import STOPS_STATE
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros.conversions import (
+    recovery_from_msg,
     status_from_msg,
     time_from_msg,
     trajectory_from_msg,
@@ -114,6 +115,7 @@ class DriverClient:
         stop_heard: Callable[[], None] = lambda: None,
     ) -> None:
         self.name = name
+        self._node = node
         self._stop_heard = stop_heard
         self._mode: Mode | None = None
         self.timers: ControllerTimers | None = None
@@ -137,8 +139,10 @@ class DriverClient:
         )
         self.stops: int | None = None
         self.stop_latched: bool | None = None
+        self._recovery: tuple[int, int] | None = None
         node.create_subscription(UInt64, f"{name}/stop_number", self._read_stops, LATCHED)
         node.create_subscription(Bool, f"{name}/stop_latched", self._read_latched, LATCHED)
+        node.create_subscription(Header, f"{name}/last_recovery", self._read_recovery, LATCHED)
 
     @property
     def mode(self) -> Mode | None:
@@ -295,6 +299,27 @@ class DriverClient:
     def _read_stops(self, message: UInt64) -> None:
         self.stops = int(message.data)
         self._stop_heard()
+        self._waiting.look()
+
+    @property
+    def recovery_known(self) -> bool:
+        """Whether it is known when the last stop that was heard of was recovered, or it is latched:
+        stop and recovery are told by topics of their own, and either may come late.
+        """
+        if self._recovery is None:  # a driver of another kind does not tell
+            return self._node.count_publishers(f"{self.name}/last_recovery") == 0
+        return self.stop_latched is True or self._recovery[0] == self.stops
+
+    def recovered_after(self, sent: int) -> bool:
+        """Whether the last stop was recovered after `sent` [ns of the system's clock], or may have
+        been; 0: not known when that was.
+        """
+        if self._recovery is None or sent == 0:
+            return False
+        return self._recovery[0] != self.stops or sent < self._recovery[1]
+
+    def _read_recovery(self, message: Header) -> None:
+        self._recovery = recovery_from_msg(message)
         self._waiting.look()
 
     def _read_latched(self, message: Bool) -> None:

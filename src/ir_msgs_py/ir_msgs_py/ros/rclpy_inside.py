@@ -14,7 +14,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import Any, NamedTuple
 
 from action_msgs.msg import GoalStatus
 from rclpy.action import ActionServer
@@ -190,12 +190,25 @@ class _RequestId(ctypes.Structure):
     _fields_ = (("writer", ctypes.c_uint8 * 16), ("sequence_number", ctypes.c_int64))
 
 
+class WrittenRequest(NamedTuple):
+    """Identity of a request for a goal: its writer (16 bytes), the number that it has there, and
+    `sent` [ns], when it was written by the clock of its writer's host, 0 where the middleware does
+    not say.
+    """
+
+    writer: bytes
+    sequence_number: int
+    sent: int
+
+
 def participant_of(request_id: Any) -> bytes:
     """Participant of who wrote a request; b"" where it is not known.
 
     A request carries the identity of the endpoint that wrote it, which rclpy keeps for itself; its
     first bytes are those of the process's participant.
     """
+    if isinstance(request_id, WrittenRequest):
+        return request_id.writer[:_PARTICIPANT]
     if part(_rclpy, "rmw_request_id_t") is not type(request_id):
         return b""
     value = ctypes.c_void_p.from_address(id(request_id) + _VALUE).value
@@ -241,6 +254,7 @@ def forget_request(goal: Any) -> None:
         goal._goal_request = type(goal.request)()
 
 
+_NOTHING = 601  # RCL_RET_SERVICE_TAKE_FAILED: no request waits
 _TIMEOUT = 2  # RCL_RET_TIMEOUT: the client was not discovered in time
 _INFO = 16  # bytes of the times in front of a request's identity in rmw_service_info_t
 _Create = ctypes.PYFUNCTYPE(ctypes.c_void_p)
@@ -431,6 +445,100 @@ def survive_clients(node: Node) -> None:
             service.survives = True
 
 
+class _ServiceInfo(ctypes.Structure):
+    """rmw_service_info_t."""
+
+    _fields_ = (
+        ("sent", ctypes.c_int64),
+        ("received", ctypes.c_int64),
+        ("request_id", _RequestId),
+    )
+
+
+class GoalRequests:
+    """Requests for goals of an action server's handle, with the times at which they were written.
+
+    rclpy takes them without these times. A request that was lost on its way comes late, as its
+    client's middleware sends it again: only its time tells that it is older than a stop.
+    """
+
+    def __init__(self, handle: Any, action_type: Any) -> None:
+        """Raises LookupError where an inside is missing."""
+        request = type(action_type.Impl.SendGoalService.Request)
+        response = type(action_type.Impl.SendGoalService.Response)
+        for kind in (request, response):
+            if part(kind, "_CONVERT_FROM_PY") is None:
+                kind.__import_type_support__()
+        names = ("_CREATE_ROS_MESSAGE", "_CONVERT_FROM_PY", "_DESTROY_ROS_MESSAGE")
+        capsules = [part(response, name) for name in names]
+        try:
+            rcl = ctypes.CDLL("librcl.so")
+            self._take = rcl.rcl_take_request_with_info
+            name_of = rcl.rcl_service_get_service_name
+            self._send = ctypes.CDLL("librcl_action.so").rcl_action_send_goal_response
+            self._forget = ctypes.CDLL("librcutils.so").rcutils_reset_error
+        except (OSError, AttributeError) as error:
+            raise LookupError(str(error)) from error
+        if None in (*capsules, part(handle, "pointer")):
+            raise LookupError("rclpy has no pointer to an action server")
+        self._handle = handle
+        self._create = _Create(_address(capsules[0]))
+        self._fill = _Fill(_address(capsules[1]))
+        self._destroy = _Destroy(_address(capsules[2]))
+        name_of.restype = ctypes.c_char_p
+        if not (name_of(self._service()) or b"").endswith(b"/_action/send_goal"):
+            raise LookupError("an action server of rcl does not begin with its service of goals")
+
+    def _service(self) -> ctypes.c_void_p:
+        """The service of goals: the first part of what rcl_action_server_t points to."""
+        return ctypes.c_void_p(ctypes.c_void_p.from_address(self._handle.pointer).value)
+
+    def take(self, kind: Any, sent: Callable[[int], None]) -> tuple[WrittenRequest, Any] | None:
+        """The next request, as an object of the class `kind`; sent: is told when it was written,
+        before it is converted.
+        """
+        create = _Create(_address(type(kind)._CREATE_ROS_MESSAGE))
+        destroy = _Destroy(_address(type(kind)._DESTROY_ROS_MESSAGE))
+        convert = converter(type(kind))
+        assert convert is not None  # rclpy converts its requests with it
+        info = _ServiceInfo()
+        message = create()
+        try:
+            with self._handle:
+                code = self._take(self._service(), ctypes.byref(info), ctypes.c_void_p(message))
+            if code != 0:
+                self._forget()
+            if code == _NOTHING:
+                return None
+            if code != 0:
+                raise RCLError(f"failed to take a request for a goal: {code}")
+            sent(info.sent)
+            request = convert(message)
+        finally:
+            destroy(message)
+        own = info.request_id
+        return WrittenRequest(bytes(own.writer), own.sequence_number, info.sent), request
+
+    def answer(self, header: WrittenRequest, response: Any) -> None:
+        """Send the response to a request."""
+        request_id = _RequestId(
+            (ctypes.c_uint8 * 16).from_buffer_copy(header.writer), header.sequence_number
+        )
+        message = self._create()
+        try:
+            if not self._fill(response, message):
+                raise RCLError("the response to a request for a goal can't be converted")
+            with self._handle:
+                at = ctypes.c_void_p(self._handle.pointer)
+                code = self._send(at, ctypes.byref(request_id), ctypes.c_void_p(message))
+            if code != 0:
+                self._forget()
+            if code not in (0, _TIMEOUT):
+                raise RCLError(f"failed to send the response to a request for a goal: {code}")
+        finally:
+            self._destroy(message)
+
+
 def _patient(plain: type) -> type:
     """rclpy's handle of an action server, whose responses reach a client that is discovered late.
 
@@ -439,9 +547,14 @@ def _patient(plain: type) -> type:
     """
 
     class PatientHandle(plain):
+        requests: GoalRequests | None = None
+
         def send_goal_response(self, header: Any, response: Any) -> None:
+            send = super().send_goal_response
+            if self.requests is not None and isinstance(header, WrittenRequest):
+                send = self.requests.answer
             try:
-                self._patiently(super().send_goal_response, header, response)
+                self._patiently(send, header, response)
             except UNSENT as error:
                 raise RCLError(str(error)) from error
 
@@ -485,7 +598,7 @@ class PatientActionServer(ActionServer):
     that have gone, and whose requests for goals a subclass may see first.
 
     Where rclpy's insides are missing, `goal_class`, `goal_came` and `unknown_result` are not
-    called, and `take_waiting` takes nothing.
+    called, `goal_sent` is told nothing, and `take_waiting` takes nothing.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
@@ -493,10 +606,17 @@ class PatientActionServer(ActionServer):
         self._early: deque[tuple[Any, Any]] = deque()  # goals that `take_waiting` took
         with _patient_handles():
             super().__init__(*arguments, **options)
+        with suppress(LookupError, AttributeError):
+            self._handle.requests = GoalRequests(self._handle, self.action_type)
 
     def goal_class(self) -> Any:
         """Class that the next request for a goal is converted to."""
         return self.action_type.Impl.SendGoalService.Request
+
+    def goal_sent(self, sent: int) -> None:
+        """Be told when the request that is converted next was written [ns of its writer's clock],
+        0 where that is not known.
+        """
 
     def goal_came(self, request_id: Any, request: Any) -> None:
         """Look at a request for a goal before it is accepted."""
@@ -568,9 +688,13 @@ class PatientActionServer(ActionServer):
         """The next request for a goal with its identity, seen by `goal_came`."""
         if not self._takes_goals():
             return None
+        requests: GoalRequests | None = part(self._handle, "requests")
         with self._lock:
-            goal = self._handle.take_goal_request(self.goal_class())
-        if not all(goal):
+            if requests is None:
+                goal = self._handle.take_goal_request(self.goal_class())
+            else:
+                goal = requests.take(self.goal_class(), self.goal_sent)
+        if goal is None or not all(goal):
             return None
         self.goal_came(*goal)
         return goal[0], goal[1]

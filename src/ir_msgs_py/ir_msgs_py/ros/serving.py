@@ -360,7 +360,8 @@ class RecordedActionServer(PatientActionServer):
     clients of its goals.
 
     came: is told the id of a goal when it is taken from the middleware, also by `take_waiting`,
-    which may be long before it is accepted.
+    which may be long before it is accepted; and when it was sent [ns of its sender's clock], 0
+    where that is not known.
     """
 
     def __init__(
@@ -369,10 +370,11 @@ class RecordedActionServer(PatientActionServer):
         action_type: Any,
         name: str,
         *arguments: Any,
-        came: Callable[[bytes], None] = lambda goal_id: None,
+        came: Callable[[bytes, int], None] = lambda goal_id, sent: None,
         **options: Any,
     ) -> None:
         self._came = came
+        self._sent = 0
         self._senders = TakenGoals[bytes]()
         self._clients = ActionClients(node, name)
         self._calls = Calls.of(node)
@@ -380,11 +382,15 @@ class RecordedActionServer(PatientActionServer):
         self._full_name = node.resolve_topic_name(name)
         super().__init__(node, action_type, name, *arguments, **options)
 
+    def goal_sent(self, sent: int) -> None:
+        """Note when the goal that comes next was sent."""
+        self._sent = sent
+
     def goal_came(self, request_id: Any, request: Any) -> None:
         """Note who has sent the goal, and tell of it."""
         key = bytes(request.goal_id.uuid)
         self._senders.note(key, participant_of(request_id))
-        self._came(key)
+        self._came(key, self._sent)
 
     def watch(self, goal_id: bytes, timeout: float) -> Gone:
         """Whether the client of a goal has been gone for `timeout` [s], from now on; 0: never. To

@@ -22,7 +22,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool, Float64, UInt64
+from std_msgs.msg import Bool, Float64, Header, UInt64
 
 from ir_description import Cell, cell_from_yaml, cell_to_yaml
 from ir_kernels.chain import Chain
@@ -38,6 +38,7 @@ from ir_msgs_py.ros.conversions import (
     configuration_given,
     configuration_to_msg,
     point_from_msg,
+    recovery_from_msg,
     status_from_msg,
     status_to_msg,
 )
@@ -483,6 +484,12 @@ class MoveItNode(Node):
                 self._executor.hear(topic, int(message.data))
 
             self.create_subscription(kind, topic, hear, LATCHED, callback_group=group)
+
+        def hear_recovery(message: Header) -> None:
+            self._executor.hear_recovery(recovery_from_msg(message)[1])
+
+        topic = f"{driver}/{names.LAST_RECOVERY.rpartition('/')[2]}"
+        self.create_subscription(Header, topic, hear_recovery, LATCHED, callback_group=group)
 
     def destroy_node(self) -> None:
         """Let go of the planner, then of the rest."""

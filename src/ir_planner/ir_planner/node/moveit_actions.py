@@ -59,6 +59,7 @@ class TrajectoryExecution:
         self._lock = Lock()
         self._accepted: WeakSet[Cancellation] = WeakSet()
         self._heard: dict[str, int] = {}
+        self._recovered = 0
 
     def stop(self) -> None:
         """Stop what is driven now, along its path, and drive nothing that was accepted before."""
@@ -73,11 +74,26 @@ class TrajectoryExecution:
             self._heard[topic] = value
             self.stop()
 
-    def accept(self) -> Cancellation:
-        """What cancels a goal that is accepted now: its client, or a stop of all."""
+    def hear_recovery(self, recovered: int) -> None:
+        """The driver tells when its last stop was recovered [ns of the system's clock]; 0: there
+        was none.
+        """
+        with self._lock:
+            known = self._recovered
+            self._recovered = recovered
+        if recovered != known:
+            self.stop()
+
+    def accept(self, sent: int = 0) -> Cancellation:
+        """What cancels a goal that is accepted now: its client, or a stop of all. One that was sent
+        [ns of the system's clock; 0: not known] before the last recovery is canceled already.
+        """
         accepted = Cancellation()
         with self._lock:
+            late = 0 < sent < self._recovered
             self._accepted.add(accepted)
+        if late:
+            accepted.cancel()
         return accepted
 
     def drive(self, trajectory: Any, stopped: Cancellation) -> Status:
@@ -124,9 +140,11 @@ class AcceptedGoals:
         self._taken = TakenGoals[Cancellation]()
         self._goals: dict[bytes, _Accepted] = {}
 
-    def came(self, goal_id: bytes) -> None:
-        """A goal is taken from the middleware: a stop that is heard from now on ends it."""
-        self._taken.note(goal_id, self._executor.accept())
+    def came(self, goal_id: bytes, sent: int) -> None:
+        """A goal that was sent then [ns] is taken from the middleware: a stop that is heard from
+        now on ends it.
+        """
+        self._taken.note(goal_id, self._executor.accept(sent))
 
     def add(self, goal: Any, gone: Gone = lambda: False) -> None:
         """A goal is accepted; gone: whether its client has gone."""

@@ -187,11 +187,11 @@ class Driver:
 
     # -- movements --------------------------------------------------------------------------------
 
-    def admit(self, points: int, size: int = 0) -> int:
+    def admit(self, points: int, size: int = 0, sent: int = 0) -> int:
         """Ticket for a goal of so many points and bytes, before it is converted. Raises
         TrajectoryRefusedError.
         """
-        return self._goals.admit(points, size)
+        return self._goals.admit(points, size, sent)
 
     def submit(
         self,
@@ -281,6 +281,11 @@ class Driver:
     def stop_number(self) -> int:
         """Number of the last stop (`ir_msgs_py.stop_numbers`)."""
         return self._simulation.stop_number
+
+    @property
+    def recovered(self) -> int:
+        """When the last stop was recovered [ns of the system's clock]; 0: there was none."""
+        return self._goals.recovered
 
     @property
     def inputs_in_force(self) -> PlcInputs | None:
@@ -384,7 +389,9 @@ class Driver:
         """
         with self._access.online() as simulation:
             simulation.plc.stop.refuse_earlier(came_ns, "recover")
-            return simulation.recover()
+            remark = simulation.recover()
+            self._goals.heed_stop()
+            return remark
 
     def set_load(self, load: Callable[[Cell], Carried]) -> Carried:
         """Carry what `load` makes of the cell, from now on."""

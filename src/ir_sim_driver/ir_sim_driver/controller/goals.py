@@ -7,6 +7,7 @@ admitted before it, also those that are being checked; they can't start later.
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -132,13 +133,25 @@ def ended_by_stop(number: int) -> str:
     )
 
 
+def sent_before_recovery(number: int, earlier: int) -> str:
+    """Sentence of a goal that was sent so much [ns] before a stop was recovered and came later."""
+    return (
+        f"the trajectory was sent {1e-9 * earlier:.3f} s before stop {stop_count(number)} was "
+        "recovered, by its sender's clock: send it again"
+    )
+
+
 class Goals:
     """Goals of `simulation`, which is only touched under `lock`; now: present time of the clock
-    [ns].
+    [ns]; wall: of the system's clock [ns], by which senders say when they sent a goal.
     """
 
     def __init__(
-        self, simulation: Simulation, lock: threading.Lock, now: Callable[[], int]
+        self,
+        simulation: Simulation,
+        lock: threading.Lock,
+        now: Callable[[], int],
+        wall: Callable[[], int] = time.time_ns,
     ) -> None:
         self._simulation = simulation
         self._lock = lock
@@ -146,7 +159,10 @@ class Goals:
         self._checker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="trajectory_checks")
         self._dead = ""
         self._queue = TrajectoryQueue()
+        self._wall = wall
         self._stop_seen = simulation.stop_number
+        self._heeded = simulation.stop_number, simulation.stopped
+        self._recovered = 0
         self._running: dict[int, int] = {}  # ids of started goals by ticket
         self._waiting: dict[int, tuple[int, Ended]] = {}  # tickets and senders by id
 
@@ -154,10 +170,28 @@ class Goals:
         """Stop checking."""
         self._checker.shutdown(wait=True, cancel_futures=True)
 
-    def admit(self, points: int, size: int = 0) -> int:
-        """Ticket for a goal of so many points and bytes, taken before it is converted.
+    @property
+    def recovered(self) -> int:
+        """When the last stop was recovered [ns of the system's clock]; 0: there was none."""
+        return self._recovered
 
-        Raises TrajectoryRefusedError: too many, or a stop is latched.
+    def heed_stop(self) -> None:
+        """Note when a stop comes or is recovered; what was sent before that starts nothing. The
+        lock is held.
+        """
+        present = self._simulation.stop_number, self._simulation.stopped
+        if present != self._heeded:
+            self._heeded = present
+            self._recovered = self._wall()
+        elif self._recovered:  # a clock that was set back must not refuse until it is there again
+            self._recovered = min(self._recovered, self._wall())
+
+    def admit(self, points: int, size: int = 0, sent: int = 0) -> int:
+        """Ticket for a goal of so many points and bytes, taken before it is converted; sent: when
+        [ns of the sender's clock], 0 where that is not known.
+
+        Raises TrajectoryRefusedError: too many, a stop is latched, or it was sent before the last
+        one was recovered.
         """
         with self._lock:
             simulation = self._simulation
@@ -165,6 +199,10 @@ class Goals:
                 raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, self._dead)
             if simulation.stopped:
                 raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, simulation.refusal())
+            self.heed_stop()
+            if 0 < sent < self._recovered:
+                late = sent_before_recovery(simulation.stop_number, self._recovered - sent)
+                raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, late)
             return self._queue.admit(
                 points, size, simulation.stop_number, simulation.settings.execution
             )
@@ -208,6 +246,7 @@ class Goals:
         is free again. The lock is held.
         """
         calls = []
+        self.heed_stop()
         if self._stop_seen != self._simulation.stop_number:
             number = self._simulation.stop_number
             self._stop_seen = number

@@ -110,11 +110,12 @@ class Admission(NamedTuple):
     refusal: str = ""
 
 
-Admit = Callable[[int, int], Admission]
+Admit = Callable[[int, int, int], Admission]
+"""Asked with points, bytes, and when it was sent [ns of the sender's clock; 0: unknown]."""
 
 
 class _CountedRequest:
-    """Looks like the class `request` to rclpy; admit: from points and bytes.
+    """Looks like the class `request` to rclpy; sent [ns]: when the next one was written.
 
     admission: of the request that was converted last. Where it is refused its points are left out.
     known: whether there is a goal of this id already, which rclpy refuses. Where the class has no
@@ -125,6 +126,7 @@ class _CountedRequest:
         kind = type(request)
         convert = converter(kind)
         self.admission = Admission()
+        self.sent = 0
         self.as_class: Any = request
         if convert is None:
             return
@@ -135,7 +137,7 @@ class _CountedRequest:
             points = head.trajectory.points
             self.admission = Admission()
             if not known(bytes(head.goal_id)):
-                self.admission = _judged(head, admit)
+                self.admission = _judged(head, admit, self.sent)
             if not self.admission.ticket:
                 _emptied(head)  # what is there is freed by its capacity, whatever its size
                 return convert(message)
@@ -147,7 +149,7 @@ class _CountedRequest:
         self.as_class = lookalike(kind, self._kept)
 
 
-def _judged(head: Any, admit: Admit) -> Admission:
+def _judged(head: Any, admit: Admit, sent: int) -> Admission:
     """What becomes of a goal by its counts alone."""
     trajectory = head.trajectory
     multi_dof = head.multi_dof
@@ -162,7 +164,7 @@ def _judged(head: Any, admit: Admit) -> Admission:
         if count > _NAMES_MAX:
             return Admission(refusal=f"the goal has {count} {name}: at most {_NAMES_MAX}")
     points = trajectory.points
-    return admit(points.size, _bytes_of(points))
+    return admit(points.size, _bytes_of(points), sent)
 
 
 def _said(field: str) -> str:
@@ -206,6 +208,11 @@ class BoundedActionServer(RecordedActionServer):
     def goal_class(self) -> Any:
         """The counting class."""
         return self._counted.as_class
+
+    def goal_sent(self, sent: int) -> None:
+        """Note it for who admits the goal."""
+        super().goal_sent(sent)
+        self._counted.sent = sent
 
     def goal_came(self, request_id: Any, request: Any) -> None:
         """Note who has sent the goal, and what the driver said of it."""

@@ -257,13 +257,13 @@ class SimDriver(Node):
         self._refuse_waiting()
         return response
 
-    def _admit(self, points: int, size: int) -> Admission:
-        """Ask the driver for a goal of so many points and bytes."""
+    def _admit(self, points: int, size: int, sent: int) -> Admission:
+        """Ask the driver for a goal of so many points and bytes that was sent then [ns]."""
         number = self._driver.stop_number
         if self._drained != number and not self._driver.stopped:
             return Admission(refusal=ended_by_stop(number))  # it may have waited since before
         try:
-            return Admission(self._driver.admit(points, size))
+            return Admission(self._driver.admit(points, size, sent))
         except TrajectoryRefusedError as error:
             return Admission(refusal=str(error))
 

@@ -12,14 +12,14 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool, UInt64
+from std_msgs.msg import Bool, Header, UInt64
 from trajectory_msgs.msg import JointTrajectory
 
 from ir_msgs.msg import ControllerState, LoadCheck, PlcInputs, PlcOutputs, PowerState
 from ir_msgs_py import names
 from ir_msgs_py.names import own
 from ir_msgs_py.plc import PlcInputs as Levels
-from ir_msgs_py.ros.conversions import time_to_msg
+from ir_msgs_py.ros.conversions import recovery_to_msg, time_to_msg
 from ir_msgs_py.ros.power_conversions import (
     plc_inputs_to_msg,
     plc_outputs_to_msg,
@@ -50,7 +50,7 @@ _HEAD = 65_536  # bytes for header and names: some twenty times what they need
 class TrajectoryTopic:
     """Hands each trajectory to the driver; what is refused becomes a warning.
 
-    admit: from points and bytes.
+    admit: from points, bytes and when it was sent.
     """
 
     def __init__(self, node: Node, driver: Driver, admit: Admit) -> None:
@@ -70,21 +70,23 @@ class TrajectoryTopic:
             taken = take_bytes(self._subscription)
             if taken is None:
                 return True
-            self._take(taken[0])
+            self._take(*taken)
         return False
 
-    def _take(self, message: bytes) -> None:
+    def _take(self, message: bytes, times: dict[str, int]) -> None:
         most = self._driver.max_points
         bound = _HEAD + _POINT * most
         if len(message) > bound:
-            size = f"{len(message)} bytes: at most {bound}, for {most} points"
-            self._driver.warn(f"trajectory of the topic: it has {size}")
+            excess = f"{len(message)} bytes: at most {bound}, for {most} points"
+            self._driver.warn(f"trajectory of the topic: it has {excess}")
             return
 
         def read() -> TrajectoryGoal:
             return goal_from_trajectory(self._reader.read(message), most)
 
-        admission = self._admit(0, _OBJECTS * len(message))  # points are counted when it is read
+        sent = times.get("source_timestamp", 0)
+        size = _OBJECTS * len(message)
+        admission = self._admit(0, size, sent)  # points are counted when it is read
         if admission.refusal:
             self._ended(refused(admission.refusal))
         else:
@@ -112,10 +114,12 @@ class StopTopics:
         self._driver = driver
         self._stop_numbers = node.create_publisher(UInt64, own(names.STOP_NUMBER), LATCHED)
         self._stop_latched = node.create_publisher(Bool, own(names.STOP_LATCHED), LATCHED)
+        self._recoveries = node.create_publisher(Header, own(names.LAST_RECOVERY), LATCHED)
         self._in_force = node.create_publisher(PlcInputs, own(names.PLC_INPUTS_IN_FORCE), LATCHED)
         self._telling = threading.Lock()  # what is newer is told later
         self._number = -1
         self._stopped: bool | None = None
+        self._recovery: tuple[int, int] | None = None
         self._inputs: Levels | None = None
 
     def tell(self) -> None:
@@ -126,6 +130,10 @@ class StopTopics:
                 self._number = number
                 self._stop_numbers.publish(UInt64(data=number))
             stopped = self._driver.stopped
+            recovery = number, self._driver.recovered
+            if not stopped and recovery != self._recovery:
+                self._recovery = recovery
+                self._recoveries.publish(recovery_to_msg(*recovery))
             if stopped is not self._stopped:
                 self._stopped = stopped
                 self._stop_latched.publish(Bool(data=stopped))
