@@ -201,7 +201,8 @@ def test_input_without_sense_ends_with_two_and_a_sentence(
     ("content", "sentence"),
     [
         ("time\n0\n1\n", "no column joint_a1"),
-        ("t,joint_a1\n0,0\n1,0\n", "no column time"),
+        ("t,joint_a1\n0,0\n1,0\n", "column t has no unit"),
+        ("clock,joint_a1\n0,0\n1,0\n", "no column time"),
         ("time,joint_a1\n0,0\n", "has 1 points"),
         ("time,joint_a1\n0,0\n1\n", ":3: has 1 values"),
         ("time,joint_a1\n0,x\n1,0\n", ":2: joint_a1 is 'x'"),

@@ -304,10 +304,20 @@ def test_every_conversion_is_round_tripped_here():
     elsewhere = {"time", "point", "pose", "stamped_pose", "configuration", "cell_state"}
     elsewhere |= {"contact", "machine_states"}  # test_contact_values.py
     elsewhere |= {"saving"}  # a part of program_savings
+    elsewhere |= {"recovery"}
     there_and_back = {
         name.removesuffix("_to_msg") for name in CONVERSIONS if name.endswith("_to_msg")
     }
     assert there_and_back - elsewhere == {*ROUND_TRIPS, "duration"}
+
+
+@given(st.integers(0, 2**64 - 1), st.integers(0, 2**31 * 10**9 - 1))
+def test_a_recovery_comes_back_and_a_header_of_something_else_names_no_stop(number, recovered):
+    message = conversions.recovery_to_msg(number, recovered)
+    assert conversions.recovery_from_msg(message) == (number, recovered)
+    for text in ("", "cell", f"-{number}", f"{number}.0", "9" * 21, "٣"):
+        message.frame_id = text
+        assert conversions.recovery_from_msg(message) == (-1, recovered)
 
 
 @given(poses())
