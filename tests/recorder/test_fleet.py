@@ -16,6 +16,7 @@ from pyarrow import parquet
 
 from ir_cli.main import main
 from ir_recorder import Analysis
+from ir_recorder.analysis.production import PREDICTED
 from ir_recorder.report.costs import Costs
 from ir_recorder.report.fleet import (
     Member,
@@ -59,6 +60,18 @@ def test_the_sums_are_those_of_the_members(member: Member) -> None:
     assert all(
         0.0 <= joules <= by_robot["left"] for own in measures.values() for joules in own.values()
     )
+
+
+def test_robots_stand_in_the_order_of_the_years_that_are_shown(member: Member) -> None:
+    """Of a plan that nobody drove that is today's program, whatever the plan takes."""
+    costs = Costs()
+    cycle = replace(member.cycle, origin=PREDICTED)
+    for factor in (0.1, 10.0):
+        energies = {name: factor * getattr(cycle, name) for name in ("energy", "low", "high")}
+        planned = replace(member, robot="planned", cycle=replace(cycle, **energies))
+        shown = [robot.now.value for robot in robots_of([member, planned], costs)]
+        assert len(set(shown)) == 2
+        assert shown == sorted(shown, reverse=True)
 
 
 def test_shifts_of_one_robot_are_averaged(member: Member) -> None:

@@ -357,7 +357,7 @@ def robots_of(members: Sequence[Member], costs: Costs) -> list[Robot]:
                 any(member.cycle.drives_only for member in own),
             )
         )
-    return sorted(found, key=lambda robot: -robot.yearly.value)
+    return sorted(found, key=lambda robot: -robot.now.value)
 
 
 def at_mains(members: Sequence[Member]) -> list[Member]:
