@@ -189,3 +189,28 @@ def test_energy_is_the_integral_of_the_published_power(make):
             last = frame.power.energy
     assert total == pytest.approx(last, rel=1e-9)
     driver.close()
+
+
+def test_what_was_sent_before_the_last_recovery_is_refused_but_not_by_a_clock_that_was_set_back(
+    driver, monkeypatch
+):
+    clock = [5000]
+    monkeypatch.setattr(driver._goals, "_wall", lambda: clock[0])
+    assert driver.recovery[1] == 0
+    assert driver.admit(1, sent=1)  # no stop came yet
+    driver.press("service", "emergency_stop", True)
+    frames(driver, 500)
+    driver.press("service", "emergency_stop", False)
+    frames(driver, 500, first=501)
+    assert driver.recovery[1] == 0  # a press is no recovery
+    clock[0] = 7000
+    driver.recover()
+    assert driver.recovery == (driver.stop_number, 7000)
+    with pytest.raises(TrajectoryRefusedError, match="before stop 1 was recovered"):
+        driver.admit(1, sent=6999)
+    assert driver.admit(1, sent=7000)
+    assert driver.admit(1)  # not known when it was sent
+    clock[0] = 6000
+    frames(driver, 1, first=1001)
+    assert driver.recovery == (driver.stop_number, 6000)
+    assert driver.admit(1, sent=6000)

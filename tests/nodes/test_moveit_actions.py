@@ -112,8 +112,12 @@ def test_a_goal_that_was_sent_before_a_recovery_is_canceled_whenever_it_comes(
 ) -> None:
     execution.hear_recovery(0)
     before = execution.accept(1000)
+    unknown = execution.accept()
+    after = execution.accept(2000)
     execution.hear_recovery(2000)
     assert before.canceled
+    assert unknown.canceled
+    assert not after.canceled
     assert execution.accept(1999).canceled
     assert not execution.accept(2000).canceled
     assert not execution.accept().canceled  # not known when it was sent

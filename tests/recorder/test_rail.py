@@ -55,7 +55,8 @@ def test_a_carriage_that_stands_says_what_the_arm_says_that_stands_there(
         assert 0.0 <= ours.joint_energy[0] < 20.0
         assert ours.seconds == theirs.seconds
         assert ours.base_energy == theirs.base_energy
-    moved, stood = railed.steps[0], arm.steps[0]
+    moved = railed.steps[0]
+    stood = arm.steps[0]
     held = moved.energy - stood.energy
     assert 0.0 < held < moved.joint_energy[0]
     assert moved.torque_energy - stood.torque_energy == pytest.approx(held, abs=1e-3)

@@ -227,7 +227,8 @@ def test_a_year_of_a_layout_has_the_cycles_that_a_plan_of_it_has() -> None:
     settings = LayoutSettings(cell="open", stations=stations, base={"x": (-0.1, 0.1)})
     words = {"stage": "plan", "values": {}, "payload": {}, "cycle_time": 0.0, "seed": 0}
     made = search.maker({**settings.budget, "cell_yaml": cell_to_yaml(load_cell("open"))})
-    own, given = made(words), made({**words, "robots": True})
+    own = made(words)
+    given = made({**words, "robots": True})
     plan = Planner("open", clock=lambda: 0.0).plan_program(stations=stations, savings=True)
     final = Final(Placement({}), settings.conditions[0], (given,))
     assert final.pace == plan.savings.total.seconds != plan.report.duration

@@ -10,7 +10,7 @@ from importlib import import_module
 from threading import Lock
 from time import monotonic, sleep
 from typing import Any
-from weakref import WeakSet
+from weakref import WeakKeyDictionary
 
 from ir_msgs_py.ros.goal_clients import Gone
 from ir_msgs_py.ros.serving import TakenGoals
@@ -57,7 +57,7 @@ class TrajectoryExecution:
         self._send = send
         self._check_begin = check_begin
         self._lock = Lock()
-        self._accepted: WeakSet[Cancellation] = WeakSet()
+        self._accepted: WeakKeyDictionary[Cancellation, int] = WeakKeyDictionary()
         self._heard: dict[str, int] = {}
         self._recovered = 0
 
@@ -79,10 +79,10 @@ class TrajectoryExecution:
         was none.
         """
         with self._lock:
-            known = self._recovered
             self._recovered = recovered
-        if recovered != known:
-            self.stop()
+            late = [each for each, sent in self._accepted.items() if sent < recovered]
+        for each in late:
+            each.cancel()
 
     def accept(self, sent: int = 0) -> Cancellation:
         """What cancels a goal that is accepted now: its client, or a stop of all. One that was sent
@@ -91,7 +91,7 @@ class TrajectoryExecution:
         accepted = Cancellation()
         with self._lock:
             late = 0 < sent < self._recovered
-            self._accepted.add(accepted)
+            self._accepted[accepted] = sent
         if late:
             accepted.cancel()
         return accepted

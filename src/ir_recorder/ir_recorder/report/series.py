@@ -175,9 +175,8 @@ def _curves(analysis: Analysis) -> Iterator[Curves]:
 def _rail(analysis: Analysis) -> str:
     """Name of the external axis that the first joint is, "" where the robot stands."""
     joints = analysis.recording.joints
-    if joints is None or joints.names[0] not in EXTERNAL_AXES:
-        return ""
-    return joints.names[0]
+    first = "" if joints is None else next(iter(joints.names), "")
+    return first if first in EXTERNAL_AXES else ""
 
 
 def _with_rail(curves: Curves, rail: str, name: str, unit: str) -> Iterator[Curves]:

@@ -283,9 +283,11 @@ class Driver:
         return self._simulation.stop_number
 
     @property
-    def recovered(self) -> int:
-        """When the last stop was recovered [ns of the system's clock]; 0: there was none."""
-        return self._goals.recovered
+    def recovery(self) -> tuple[int, int]:
+        """Number of the last stop that was recovered and when [ns of the system's clock]; at 0
+        none came yet.
+        """
+        return self._goals.recovery
 
     @property
     def inputs_in_force(self) -> PlcInputs | None:

@@ -162,7 +162,7 @@ class Goals:
         self._wall = wall
         self._stop_seen = simulation.stop_number
         self._heeded = simulation.stop_number, simulation.stopped
-        self._recovered = 0
+        self._recovery = simulation.stop_number, 0
         self._running: dict[int, int] = {}  # ids of started goals by ticket
         self._waiting: dict[int, tuple[int, Ended]] = {}  # tickets and senders by id
 
@@ -171,20 +171,24 @@ class Goals:
         self._checker.shutdown(wait=True, cancel_futures=True)
 
     @property
-    def recovered(self) -> int:
-        """When the last stop was recovered [ns of the system's clock]; 0: there was none."""
-        return self._recovered
+    def recovery(self) -> tuple[int, int]:
+        """Number of the last stop that was recovered and when [ns of the system's clock]; at 0
+        none came yet.
+        """
+        return self._recovery
 
     def heed_stop(self) -> None:
-        """Note when a stop comes or is recovered; what was sent before that starts nothing. The
-        lock is held.
+        """Note when a stop was recovered; what was sent before that starts nothing. The lock is
+        held.
         """
         present = self._simulation.stop_number, self._simulation.stopped
+        number, recovered = self._recovery
         if present != self._heeded:
             self._heeded = present
-            self._recovered = self._wall()
-        elif self._recovered:  # a clock that was set back must not refuse until it is there again
-            self._recovered = min(self._recovered, self._wall())
+            if not self._simulation.stopped:
+                self._recovery = self._simulation.stop_number, self._wall()
+        elif recovered:  # a clock that was set back must not refuse until it is there again
+            self._recovery = number, min(recovered, self._wall())
 
     def admit(self, points: int, size: int = 0, sent: int = 0) -> int:
         """Ticket for a goal of so many points and bytes, taken before it is converted; sent: when
@@ -200,8 +204,9 @@ class Goals:
             if simulation.stopped:
                 raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, simulation.refusal())
             self.heed_stop()
-            if 0 < sent < self._recovered:
-                late = sent_before_recovery(simulation.stop_number, self._recovered - sent)
+            number, recovered = self._recovery
+            if 0 < sent < recovered:
+                late = sent_before_recovery(number, recovered - sent)
                 raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, late)
             return self._queue.admit(
                 points, size, simulation.stop_number, simulation.settings.execution

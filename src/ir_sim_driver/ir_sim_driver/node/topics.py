@@ -130,8 +130,8 @@ class StopTopics:
                 self._number = number
                 self._stop_numbers.publish(UInt64(data=number))
             stopped = self._driver.stopped
-            recovery = number, self._driver.recovered
-            if not stopped and recovery != self._recovery:
+            recovery = self._driver.recovery
+            if recovery != self._recovery:
                 self._recovery = recovery
                 self._recoveries.publish(recovery_to_msg(*recovery))
             if stopped is not self._stopped:
