@@ -5,14 +5,18 @@ What the middleware says of a client that has gone is raised here by rclpy's own
 
 from __future__ import annotations
 
+import threading
 import time
 import warnings
+from contextlib import suppress
 from typing import Any
 
 import pytest
 import rclpy
 from rcl_interfaces.srv import ListParameters
 from rclpy.action import ActionClient, CancelResponse, GoalResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.executors import MultiThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
@@ -24,6 +28,7 @@ from ir_msgs.srv import SetPlcInput
 from ir_msgs_py.ros import rclpy_inside
 from ir_msgs_py.ros.serving import BoundedService, RecordedActionServer
 from ir_msgs_py.ros.spinning import BackgroundExecutor
+from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.ros.topics import CommandTopic, LatestMessage, PolledTopic
 from ir_msgs_py.status import StatusCode
 from ir_recorder.format.qos import QosOffer
@@ -188,6 +193,62 @@ def test_goals_are_taken_with_the_time_at_which_they_were_written(
         ros_executor.run(client.destroy)
         server.run(action.destroy)
         server.close()
+
+
+def test_goals_of_a_client_are_accepted_in_the_order_in_which_they_were_sent(
+    ros_context: Any, ros_executor: Any, ros_node: Any, wait_for: Any
+) -> None:
+    """While the first is looked at the others come, on threads of their own."""
+    node = rclpy.create_node("server", context=ros_context)
+    executor = MultiThreadedExecutor(num_threads=6, context=ros_context)
+    executor.add_node(node)
+    all_came = threading.Event()
+    came: list[bytes] = []
+    accepted: list[str] = []
+
+    def note(goal_id: bytes, _sent: int) -> None:
+        came.append(goal_id)
+        if len(came) == 5:
+            all_came.set()
+
+    def look(goal: Any) -> GoalResponse:
+        if goal.program_id == "0":
+            assert all_came.wait(PATIENCE)
+        if goal.program_id == "2":
+            raise RuntimeError("nothing can be said of this goal")
+        return GoalResponse.ACCEPT
+
+    action = RecordedActionServer(
+        node,
+        RunProgram,
+        "~/run",
+        lambda goal: RunProgram.Result(),
+        goal_callback=look,
+        handle_accepted_callback=lambda goal: accepted.append(goal.request.program_id),
+        came=note,
+        callback_group=ReentrantCallbackGroup(),
+    )
+
+    def spin() -> None:
+        while ros_context.ok() and len(accepted) < 4:
+            with suppress(RuntimeError):
+                executor.spin_once(timeout_sec=0.1)
+
+    spinning = threading.Thread(target=spin)
+    client = ros_executor.run(lambda: ActionClient(ros_node, RunProgram, "/server/run"))
+    spinning.start()
+    try:
+        wait_for(client.server_is_ready, what="the action is offered")
+        for name in "01234":
+            goal = RunProgram.Goal(program_id=name)
+            ros_executor.run(lambda goal=goal: client.send_goal_async(goal))
+        spinning.join(PATIENCE)
+        assert accepted == ["0", "1", "3", "4"]
+    finally:
+        ros_executor.run(client.destroy)
+        executor.shutdown(timeout_sec=PATIENCE)
+        action.destroy()
+        node.destroy_node()
 
 
 def test_a_client_of_a_service_that_has_gone_ends_no_executor(

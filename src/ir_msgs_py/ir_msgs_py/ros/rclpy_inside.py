@@ -593,15 +593,49 @@ def _patient_handles() -> Iterator[None]:
             _rclpy.ActionServer = plain
 
 
+class InTurn:
+    """Goals of each client, for threads that each hear of one and may overtake one another."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._came: dict[bytes, deque[tuple[Any, Any]]] = {}
+        self._served: set[bytes] = set()
+
+    def add(self, client: bytes, goal: tuple[Any, Any]) -> None:
+        """Note a goal that came."""
+        with self._lock:
+            self._came.setdefault(client, deque()).append(goal)
+
+    def waiting(self, client: bytes) -> Iterator[tuple[Any, Any]]:
+        """A client's goals, the first first, until none is left; none where another thread is about
+        them. To be looked at to its end.
+        """
+        with self._lock:
+            if client in self._served:
+                return
+            self._served.add(client)
+        while True:
+            with self._lock:
+                if client not in self._came:
+                    self._served.remove(client)
+                    return
+                goal = self._came[client].popleft()
+                if not self._came[client]:
+                    del self._came[client]
+            yield goal
+
+
 class PatientActionServer(ActionServer):
     """An ActionServer whose responses reach clients that are discovered late, that survives those
-    that have gone, and whose requests for goals a subclass may see first.
+    that have gone, that accepts a client's goals in the order in which they came, also where its
+    callback group lets several threads in, and whose requests for goals a subclass may see first.
 
     Where rclpy's insides are missing, `goal_class`, `goal_came` and `unknown_result` are not
-    called, `goal_sent` is told nothing, and `take_waiting` takes nothing.
+    called, `goal_sent` is told nothing, `take_waiting` takes nothing, and threads are not ordered.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
+        self._in_turn = InTurn()
         self._taking = threading.Lock()
         self._early: deque[tuple[Any, Any]] = deque()  # goals that `take_waiting` took
         with _patient_handles():
@@ -623,6 +657,22 @@ class PatientActionServer(ActionServer):
 
     def unknown_result(self, result: Any) -> None:
         """Say in an empty result that there is no such goal, or not any more."""
+
+    async def _execute_goal_request(self, taken: tuple[Any, Any]) -> None:
+        """Accept or reject all goals of this one's client that have been taken, the first first;
+        nothing where another thread is about it.
+        """
+        if not self._takes_goals():
+            await super()._execute_goal_request(taken)
+            return
+        failures: list[Exception] = []
+        for goal in self._in_turn.waiting(participant_of(taken[0])):
+            try:
+                await super()._execute_goal_request(goal)
+            except Exception as failure:  # the next goal has nobody else
+                failures.append(failure)
+        if failures:
+            raise failures[0]
 
     async def _execute_get_result_request(self, taken: tuple[Any, Any]) -> None:
         """As rclpy's, which answers for a goal that it does not know with a result of zeros."""
@@ -697,6 +747,7 @@ class PatientActionServer(ActionServer):
         if goal is None or not all(goal):
             return None
         self.goal_came(*goal)
+        self._in_turn.add(participant_of(goal[0]), goal)
         return goal[0], goal[1]
 
 
