@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -206,15 +206,19 @@ def success_over_time(
 
 
 def cost_over_time(
-    planners: Sequence[str], runs: Sequence[ArenaRun], time: FloatArray
+    planners: Sequence[str], runs: Sequence[ArenaRun], time: FloatArray, winner: str
 ) -> FloatArray:
-    """Median (N, planners) over the runs of J until each time (N,), in percent above the best
-    known; NaN while fewer than half of them are solved.
+    """J until each time (N,) against the winner's last answer, in percent (N, planners): as
+    `against` has it, the median over the questions that both solved, of each the median of its
+    seeds; NaN while fewer than half of them have an answer. It ends at the cost of `against`.
     """
-    best = best_costs(runs)
+    mine = _by_question(winner, runs)
     found = []
     for planner in planners:
-        own = [_ratio_until(run, best, time) for run in runs if run.entry.planner == planner]
+        its = _by_question(planner, runs)
+        both = [one for one in its if one in mine and _share(its[one]) > 0.0]
+        both = [one for one in both if _share(mine[one]) > 0.0]
+        own = [_ratio_until(its[one], _cost(mine[one]), time) for one in both]
         found.append(np.median(np.stack(own), 0) if own else np.full(len(time), np.inf))
     value = 100.0 * (np.stack(found, 1) - 1.0)
     return np.where(np.isfinite(value), value, np.nan)
@@ -225,13 +229,19 @@ def _solved_until(own: Sequence[ArenaRun], time: FloatArray) -> FloatArray:
     return np.asarray(100.0 * np.searchsorted(first, time, side="right") / max(len(own), 1))
 
 
-def _ratio_until(run: ArenaRun, best: Mapping[Question, float], time: FloatArray) -> FloatArray:
-    """J so far (N,) over the best known, inf before the first answer."""
-    if not run.solved or not run.progress:
+def _ratio_until(own: Sequence[ArenaRun], cost: float, time: FloatArray) -> FloatArray:
+    """J so far (N,) of the solved seeds of a question over a cost, their median; inf before half of
+    them have an answer.
+    """
+    found = []
+    for run in own:
+        if run.solved and run.progress:
+            at, joules = np.array(run.progress).T
+            known = np.array([np.inf, *(_over(value, cost) for value in joules)])
+            found.append(known[np.searchsorted(at, time, side="right")])
+    if not found:
         return np.full(len(time), np.inf)
-    at, cost = np.array(run.progress).T
-    known = np.array([np.inf, *(_over(value, best[run.entry.question]) for value in cost)])
-    return np.asarray(known[np.searchsorted(at, time, side="right")])
+    return np.asarray(np.median(np.stack(found), 0))
 
 
 def _over(value: float, least: float) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -108,9 +108,10 @@ def _view() -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 SCRIPTS = ("charts.js", "axes.js", "export.js", "compare.js")
+_AGAINST = ">cost against"
 _HEADS = (
-    "planner", ">solved", ">first answer", ">best answer", ">cost above the best", ">movement cost above the least",  # noqa: E501
-    ">duration", ">energy", ">clearance", ">lost",
+    "planner", ">solved", ">first answer", ">best answer", _AGAINST,
+    ">movement cost above the least", ">duration", ">energy", ">clearance", ">lost",
 )  # fmt: skip
 _TIE = 1e-3  # of the cost: less is no difference to anybody
 _CHANCE = 1.0 - LEVEL  # a difference that is as likely by chance is not shown
@@ -135,6 +136,7 @@ def page_html(runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int = 
     blocked, _ = blocked_and_free(runs)
     shown = of_all(blocked or runs)
     ranking = _ranked(shown, settings)
+    winner = settings.planners[0] if ranking is None else ranking.winner
     end = min(longest(shown), settings.seconds)  # what comes after these doesn't count
     head = Head(
         "Arena: planners against each other",
@@ -148,16 +150,20 @@ def page_html(runs: Sequence[ArenaRun], settings: ArenaSettings, missing: int = 
         "verdict": verdict(runs, settings),
         "shown": _shown(runs, shown),
         "above": f"{_ABOVE:g}",
+        "winner": text(winner),
         "longest": seconds(longest(runs)),
         "cells": "".join(
-            _cell_section(runs, cell, titles, settings.planners)
+            _cell_section(of_cell(runs, cell), cell, titles[cell], settings.planners, winner)
             for cell in settings.cells
             if of_cell(runs, cell)
         ),
         "bindings": text(_bindings(runs, settings.planners)),
         "settings": text(settings_text(settings)),
         "data": json.dumps(
-            {"end": end, "axes": list(_curves(shown, settings.planners, end, _few(ranking)))},
+            {
+                "end": end,
+                "axes": list(_curves(shown, settings.planners, end, _few(ranking), winner)),
+            },
             separators=(",", ":"),
         ).replace("<", "\\u003c"),
     }
@@ -233,8 +239,7 @@ def _ranking_table(ranking: _Ranking) -> str:
                 _first(own, soonest),
             )
         )
-    against_it = f">cost against {ranking.winner}"
-    heads = ("planner", ">solved", "", against_it, ">first answer")
+    heads = ("planner", ">solved", "", f"{_AGAINST} {ranking.winner}", ">first answer")
     return table(heads, rows, "Who wins", COMPACT)
 
 
@@ -496,30 +501,35 @@ def _less(held: Against) -> str:
 
 
 def _cell_section(
-    runs: Sequence[ArenaRun], name: str, titles: Mapping[str, str], planners: Sequence[str]
+    runs: Sequence[ArenaRun], name: str, title: str, planners: Sequence[str], winner: str
 ) -> str:
-    """Picture, and figures of blocked and of free pairs apart."""
+    """Picture, and figures of blocked and of free pairs apart; costs against the winner's, as above
+    over all cells.
+    """
     cell = load_cell(name)
-    title = titles[name]
-    blocked, free = blocked_and_free(of_cell(runs, name))
+    blocked, free = blocked_and_free(runs)
     picture = cell_picture(cell, np.array(cell.tasks[0].start))
+    heads = [f"{head} {winner}" if head == _AGAINST else head for head in _HEADS]
     parts = []
     for head, part in ((_BLOCKED, blocked), (_FREE, free)):
         if part:
-            rows = [_row(figures(planner, part)) for planner in planners]
-            parts.append(f"<h3>{head}</h3>{table(_HEADS, rows, f'{title}: {head.lower()}')}")
+            rows = [
+                _row(figures(planner, part), against(winner, planner, part).cost, winner)
+                for planner in planners
+            ]
+            parts.append(f"<h3>{head}</h3>{table(heads, rows, f'{title}: {head.lower()}')}")
     shown = picture + "".join(parts)
     head = f"<summary><h2>{text(title)}</h2></summary>"
     return f'<details class="part">{head}{shown}</details>'
 
 
-def _row(found: Figures) -> tuple[str, ...]:
+def _row(found: Figures, cost: Mean, winner: str) -> tuple[str, ...]:
     return (
         text(found.planner),
         f"<b>{found.solved}</b> of {found.count}",
         milliseconds(found.first),
         milliseconds(found.final),
-        percent(found.cost_ratio - 1.0),
+        DASH if found.planner == winner else percent(cost.value / 100.0),
         percent(found.movement_ratio - 1.0),
         seconds(found.duration),
         joules(found.energy),
@@ -544,18 +554,20 @@ def _few(ranking: _Ranking | None) -> list[str]:
 
 
 def _curves(
-    runs: Sequence[ArenaRun], planners: Sequence[str], end: float, few: Sequence[str]
+    runs: Sequence[ArenaRun], planners: Sequence[str], end: float, few: Sequence[str], winner: str
 ) -> Iterator[dict[str, Json]]:
     """Success and cost over time until `end` s, of all cells together; few: whose curves stand
-    out.
+    out; winner: whom costs are held against.
     """
     time = np.linspace(0.0, end, GRID)
-    kinds: tuple[tuple[str, Callable[..., FloatArray], float, float], ...] = (
-        ("solved", success_over_time, 100.0, 0.0),
-        ("cost above the best known, median", cost_over_time, _ABOVE, _ABOVE),
+    solved = success_over_time(planners, runs, time)
+    cost = cost_over_time(planners, runs, time, winner)
+    kinds = (
+        ("solved", solved, 0.0),
+        (f"cost against {winner}", np.minimum(cost, _ABOVE), _ABOVE),
     )
-    for name, compute, most, missing in kinds:
-        value = np.nan_to_num(np.minimum(compute(planners, runs, time), most), nan=missing)
+    for name, found, missing in kinds:
+        value = np.nan_to_num(found, nan=missing)
         yield {
             **packed(Curves(name, "%", time, value, shown=True)),
             "names": list(planners),
