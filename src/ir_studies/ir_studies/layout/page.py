@@ -177,12 +177,19 @@ class PlanView:
             for kind, points in self._outlines
         ]
         shapes += [mark(*self._at(place[None])[0], *rest) for place, *rest in marks]
-        for start, end, words in moves:
-            tail, tip = self._at(np.stack([start, end]))
-            shapes.append(arrow(tail, tip, words))
+        boxes = []
         for words, place in names.items():
             x, y = self._at(place[None])[0]
+            boxes.append(box_of(words, x - 0.5 * _LETTER * len(words), y + 4.0))
             shapes.append(f'<text class="stands" x="{x:.1f}" y="{y + 4:.1f}">{text(words)}</text>')
+        corners = [self._at(points) for _, points in self._outlines]
+        tips = [self._at(np.stack([start, end])) for start, end, _ in moves]
+        shapes += [arrow(*line) for line in tips]
+        boxes += [(*line.min(axis=0), *line.max(axis=0)) for line in tips]
+        for line, (*_, words) in zip(tips, moves, strict=True):
+            x, y = place_of_words(words, list(line), corners, boxes, self._height)
+            boxes.append(box_of(words, x, y))
+            shapes.append(f'<text class="move" x="{x:.1f}" y="{y:.1f}">{text(words)}</text>')
         shapes.append(self._measure())
         kind = "plan whole" if moves else "plan"
         return (
@@ -215,21 +222,75 @@ def _is_new(outline: FloatArray, others: Sequence[FloatArray]) -> bool:
     return not any(np.allclose(one, outline, atol=1e-4) for one in alike)
 
 
-def arrow(start: FloatArray, end: FloatArray, words: str) -> str:
-    """An arrow of the drawing between places (2,), its words beyond its end."""
+def arrow(start: FloatArray, end: FloatArray) -> str:
+    """An arrow of the drawing between places (2,)."""
     way = end - start
     length = float(np.hypot(*way))
     x, y = way / length if length > 0.0 else np.array([0.0, 1.0])
     left, right = (end - 9.0 * np.array([x, y]) + side * np.array([-y, x]) for side in (4.0, -4.0))
     head = " ".join(f"{a:.1f},{b:.1f}" for a, b in (end, left, right))
-    anchor = "start" if x >= 0.0 else "end"
-    at = end + np.array([9.0 * math.copysign(1.0, x), 12.0 * y + 4.0])
     return (
         f'<path class="move" d="M{start[0]:.1f} {start[1]:.1f}L{end[0]:.1f} {end[1]:.1f}"/>'
         f'<polygon class="head" points="{head}"/>'
-        f'<text class="move" x="{at[0]:.1f}" y="{at[1]:.1f}" text-anchor="{anchor}">'
-        f"{text(words)}</text>"
     )
+
+
+# Words beside an arrow stand where they cover least of what is drawn.
+
+_LETTER = 12.2  # px of a letter of such words in bold, at most
+_TALL = 18.0  # px of their line
+_ASIDE = (12.0, 30.0, 54.0)  # px from an end of the arrow to the words
+_WAYS = 16  # directions that are tried
+Box: TypeAlias = "tuple[float, float, float, float]"
+"""Left, top, right and bottom of what is drawn."""
+
+
+def box_of(words: str, x: float, y: float) -> Box:
+    """Where words stand whose line begins at x, y."""
+    return x, y - 0.8 * _TALL, x + _LETTER * len(words), y + 0.2 * _TALL
+
+
+def covered(box: Box, solids: Sequence[FloatArray], boxes: Sequence[Box]) -> float:
+    """The share of a box that convex solids (V, 2) or other boxes lie in."""
+    left, top, right, bottom = box
+    x, y = np.meshgrid(np.linspace(left, right, 17), np.linspace(top, bottom, 7))
+    points = np.stack([x.ravel(), y.ravel()], axis=1)
+    under = np.zeros(len(points), dtype=bool)
+    for corners in solids:
+        side = np.roll(corners, -1, axis=0) - corners
+        away = points[:, None] - corners
+        turn = side[:, 0] * away[..., 1] - side[:, 1] * away[..., 0]
+        under |= (turn >= 0.0).all(axis=1) | (turn <= 0.0).all(axis=1)
+    for low_x, low_y, high_x, high_y in boxes:
+        under |= (
+            (x.ravel() > low_x) & (x.ravel() < high_x) & (y.ravel() > low_y) & (y.ravel() < high_y)
+        )
+    return float(under.mean())
+
+
+def place_of_words(
+    words: str,
+    tips: Sequence[FloatArray],
+    solids: Sequence[FloatArray],
+    boxes: Sequence[Box],
+    height: float,
+) -> tuple[float, float]:
+    """Where the line of words beside an arrow with these tips (2,) begins, within the drawing: of
+    places around its tip, then its tail, the first of those that cover least.
+    """
+    wide = _LETTER * len(words)
+    turns = [2.0 * math.pi * k / _WAYS for k in range(_WAYS)]
+    found: list[tuple[float, float, float]] = []
+    for aside in _ASIDE:
+        for end in reversed(tips):
+            for turn in turns:
+                x = end[0] + math.cos(turn) * aside + 0.5 * wide * (math.cos(turn) - 1.0)
+                y = end[1] + math.sin(turn) * (aside + 0.3 * _TALL) + 0.3 * _TALL
+                x = min(max(x, _MARGIN), WIDTH - _MARGIN - wide)
+                y = min(max(y, _MARGIN + _TALL), height - 3.0 * _MARGIN)
+                found.append((covered(box_of(words, x, y), solids, boxes), x, y))
+    _, x, y = min(found, key=lambda each: each[0])
+    return x, y
 
 
 def mark(x: float, y: float, kind: str, fill: str, words: str) -> str:
