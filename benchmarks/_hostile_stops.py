@@ -34,6 +34,7 @@ from ir_msgs_py import names
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
+from ir_msgs_py.ros.testing import own_domain
 from ir_msgs_py.ros.topics import ACTION_SERVICES
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_values.errors import IrError
@@ -341,4 +342,5 @@ def stops_row(count: int, seed: int) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
+    os.environ["ROS_DOMAIN_ID"] = str(own_domain())
     print(json.dumps(stops_row(int(sys.argv[1]), int(sys.argv[2]))))

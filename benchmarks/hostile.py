@@ -1,26 +1,30 @@
 """What does the driver survive: goals that run away, lost emergency stops, impossible loads,
 floods?
 
-    python benchmarks/hostile.py [--seeds N] [--quick] [--json FILE]
+    python benchmarks/hostile.py [--only PART]... [--seeds N] [--drivers N] [--quick] [--json FILE]
 
 The cases and their independent judge are those of tests/faults, with other seeds: finite
 differences of the executed positions against the robot's limits, presses of the emergency stop in
 every mode amid a PLC's traffic, random loads on the physics, requests of every kind in any order,
 deviations in every mode. Then the
 node is flooded as a process of its own: what it loses, and its memory, descriptors, threads and
-log.
+log. Stops are pressed amid two clients and a PLC on several drivers at once, each in a ROS domain
+of its own.
 """
 
 from __future__ import annotations
 
 import argparse
 import importlib.util
+import json
 import resource
+import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -28,7 +32,6 @@ from typing import Any
 import numpy as np
 from _hostile_floods import floods
 from _hostile_node import attack, cells_row, killed_row
-from _hostile_stops import stops_row
 from _results import Claim, add_ending, at_least, at_most, finish, line_of
 
 from ir_description import load_cell
@@ -191,96 +194,200 @@ def memory() -> float:
     return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 2**20
 
 
-def claims_of(rows: list[dict[str, Any]]) -> list[Claim]:
-    """Counts over all seeds."""
-
-    def total(case: str, key: str) -> int:
-        return sum(row[key] for row in rows if row["case"] == case)
-
-    def grown(case: str, key: str) -> float:
-        of_case = (row for row in rows if row["case"] == case)
-        return max(
-            (float(row[f"{key}_after"] - row[f"{key}_before"]) for row in of_case), default=0.0
+def stop_rows(count: int, drivers: int) -> Iterator[dict[str, Any]]:
+    """Interleavings on nodes, on so many drivers at once; each has seeds of its own."""
+    command = [sys.executable, str(Path(__file__).with_name("_hostile_stops.py"))]
+    running = [
+        subprocess.Popen(
+            [*command, str(count // drivers + (k < count % drivers)), str(FIRST_SEED + k)],
+            stdout=subprocess.PIPE,
+            text=True,
         )
+        for k in range(drivers)
+    ]
+    for process in running:
+        *said, row = process.communicate()[0].splitlines() or [""]
+        for line in said:
+            print(line)
+        if process.returncode != 0:
+            raise ChildProcessError(f"stops on a node ended with {process.returncode}: {row}")
+        yield json.loads(row)
 
-    depth = min((row["depth"] for row in rows if row["case"] == "interleavings"), default=0)
-    latest = max((row["p99.9_ms"] for row in rows if row["case"] == "press"), default=0.0)
-    kept = max(
-        (
-            100.0 * row["rss_mb_after"] / row["rss_mb_before"]
-            for row in rows
-            if row["case"] == "flood"
-        ),
-        default=0.0,
-    )
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of one part, and what claims say of them."""
+
+    rows: Sequence[dict[str, Any]]
+
+    def of(self, case: str) -> list[dict[str, Any]]:
+        """Those of a case."""
+        return [row for row in self.rows if row["case"] == case]
+
+    def total(self, case: str, key: str) -> int:
+        """A count over all rows of a case."""
+        return sum(row[key] for row in self.of(case))
+
+    def grown(self, case: str, key: str) -> float:
+        """The largest difference of a figure after and before."""
+        found = (float(row[f"{key}_after"] - row[f"{key}_before"]) for row in self.of(case))
+        return max(found, default=0.0)
+
+    def kept(self) -> float:
+        """Memory after a flood, at most [% of before]."""
+        shares = (row["rss_mb_after"] / row["rss_mb_before"] for row in self.of("flood"))
+        return 100.0 * max(shares, default=0.0)
+
+    def latest(self) -> float:
+        """Delay of a press under a flood at p99.9, at most [ms]."""
+        return max((row["p99.9_ms"] for row in self.of("press")), default=0.0)
+
+
+Part = tuple[
+    Callable[[argparse.Namespace], Iterator[dict[str, Any]]], Callable[[Rows], list[Claim]]
+]
+
+
+def _random(given: argparse.Namespace) -> Iterator[dict[str, Any]]:
+    counts = (300, 84, 60, 300, 70) if given.quick else (4_000, 1_000, 500, 5_000, 500)
+    makers = (goal_row, stop_row, load_row, fuzz_row, deviation_row)
+    for seed in range(FIRST_SEED, FIRST_SEED + (1 if given.quick else given.seeds)):
+        for make, count in zip(makers, counts, strict=True):
+            yield make(count, seed)
+
+
+def _of_random(rows: Rows) -> list[Claim]:
     return [
-        at_least("goals that were accepted and judged", total("goals", "accepted"), "", 10),
-        at_most("goals beyond a limit", total("goals", "beyond"), "", 0),
-        at_most("emergency stops lost", total("stops", "lost"), "", 0),
-        at_least("sequences of a PLC", total("sequences", "cases"), "", 2_000),
-        at_most(
-            "sequences that differ from the table of stops", total("sequences", "differ"), "", 0
-        ),
-        at_least("depth of all interleavings", depth, "", 8),
-        at_most(
-            "interleavings that break the law of stops", total("interleavings", "wrong"), "", 0
-        ),
-        at_least("interleavings of stops on a node", total("node stops", "cases"), "", 10_000),
-        at_most("of them that break the law of stops", total("node stops", "wrong"), "", 0),
-        at_least("pairs of writers", total("writers", "cases"), "", 200),
-        at_most("of them that lost anything", total("writers", "lost"), "", 0),
-        at_most("cells that ended the driver", total("cells", "ended"), "", 0),
-        at_most("killed clients whose goals went on", total("killed clients", "went_on"), "", 0),
-        at_most("presses under floods lost", total("press", "lost"), "", 0),
-        at_most("presses under floods, p99.9", latest, "ms", 50.0),
-        at_most("memory after a flood, of before", kept, "%", 120.0),
-        at_least("loads carried", total("loads", "carried"), "", 10),
-        at_most("loads that made the physics fail", total("loads", "failed"), "", 0),
-        at_most("laws broken by requests of every kind", total("fuzz", "broken"), "", 0),
-        at_most("deviations judged wrongly", total("deviations", "wrong"), "", 0),
-        at_most("requests and presses of the node lost", total("node", "lost"), "", 0),
-        at_most("memory that driving takes", grown("driving", "rss_mb"), "MB", 5.0),
-        at_most("memory that the node gains, at most", grown("node", "rss_mb"), "MB", 60.0),
-        at_most("descriptors that the node gains, at most", grown("node", "descriptors"), "", 2),
-        at_most("threads that the node gains, at most", grown("node", "threads"), "", 1),
-        at_most("log that the node writes, at most", grown("node", "log_kb"), "kB", 1_000.0),
+        at_least("goals that were accepted and judged", rows.total("goals", "accepted"), "", 10),
+        at_most("goals beyond a limit", rows.total("goals", "beyond"), "", 0),
+        at_most("emergency stops lost", rows.total("stops", "lost"), "", 0),
+        at_least("loads carried", rows.total("loads", "carried"), "", 10),
+        at_most("loads that made the physics fail", rows.total("loads", "failed"), "", 0),
+        at_most("laws broken by requests of every kind", rows.total("fuzz", "broken"), "", 0),
+        at_most("deviations judged wrongly", rows.total("deviations", "wrong"), "", 0),
     ]
 
 
+def _of_sequences(rows: Rows) -> list[Claim]:
+    differ = rows.total("sequences", "differ")
+    return [
+        at_least("sequences of a PLC", rows.total("sequences", "cases"), "", 2_000),
+        at_most("sequences that differ from the table of stops", differ, "", 0),
+    ]
+
+
+def _of_interleavings(rows: Rows) -> list[Claim]:
+    depth = min(row["depth"] for row in rows.of("interleavings"))
+    wrong = rows.total("interleavings", "wrong")
+    return [
+        at_least("depth of all interleavings", depth, "", 8),
+        at_most("interleavings that break the law of stops", wrong, "", 0),
+    ]
+
+
+def _of_files(rows: Rows) -> list[Claim]:
+    return [
+        at_least("pairs of writers", rows.total("writers", "cases"), "", 200),
+        at_most("of them that lost anything", rows.total("writers", "lost"), "", 0),
+    ]
+
+
+def _clients(given: argparse.Namespace) -> Iterator[dict[str, Any]]:
+    yield cells_row()
+    yield killed_row(1 if given.quick else 5)
+
+
+def _of_clients(rows: Rows) -> list[Claim]:
+    went_on = rows.total("killed clients", "went_on")
+    return [
+        at_most("cells that ended the driver", rows.total("cells", "ended"), "", 0),
+        at_most("killed clients whose goals went on", went_on, "", 0),
+    ]
+
+
+def _of_node(rows: Rows) -> list[Claim]:
+    grown = {key: rows.grown("node", key) for key in ("rss_mb", "descriptors", "threads", "log_kb")}
+    return [
+        at_most("requests and presses of the node lost", rows.total("node", "lost"), "", 0),
+        at_most("memory that the node gains, at most", grown["rss_mb"], "MB", 60.0),
+        at_most("descriptors that the node gains, at most", grown["descriptors"], "", 2),
+        at_most("threads that the node gains, at most", grown["threads"], "", 1),
+        at_most("log that the node writes, at most", grown["log_kb"], "kB", 1_000.0),
+    ]
+
+
+def _of_stops(rows: Rows) -> list[Claim]:
+    return [
+        at_least("interleavings of stops on a node", rows.total("node stops", "cases"), "", 10_000),
+        at_most("of them that break the law of stops", rows.total("node stops", "wrong"), "", 0),
+    ]
+
+
+def _of_floods(rows: Rows) -> list[Claim]:
+    return [
+        at_most("presses under floods lost", rows.total("press", "lost"), "", 0),
+        at_most("presses under floods, p99.9", rows.latest(), "ms", 50.0),
+        at_most("memory after a flood, of before", rows.kept(), "%", 120.0),
+    ]
+
+
+def _of_driving(rows: Rows) -> list[Claim]:
+    return [at_most("memory that driving takes", rows.grown("driving", "rss_mb"), "MB", 5.0)]
+
+
+def _driving(given: argparse.Namespace) -> Iterator[dict[str, Any]]:
+    yield driving_row(HOUR / 12.0 if given.quick else HOUR)
+
+
+def _sequences(given: argparse.Namespace) -> Iterator[dict[str, Any]]:
+    yield sequence_row(50 if given.quick else 2_000, 200)
+
+
+def _files(_given: argparse.Namespace) -> Iterator[dict[str, Any]]:
+    yield writers_row(200)
+
+
+PARTS: dict[str, Part] = {
+    "driving": (_driving, _of_driving),
+    "random": (_random, _of_random),
+    "sequences": (_sequences, _of_sequences),
+    "interleavings": (lambda given: walk_rows(4 if given.quick else 8), _of_interleavings),
+    "files": (_files, _of_files),
+    "clients": (_clients, _of_clients),
+    "node": (lambda given: attack(200, 12) if given.quick else attack(5_000, 334), _of_node),
+    "stops": (
+        lambda given: stop_rows(50 if given.quick else 10_000, given.drivers),
+        _of_stops,
+    ),
+    "floods": (lambda given: floods(20 if given.quick else 1_000), _of_floods),
+}
+
+
 def main() -> None:
-    """Run the cases, print the counts."""
+    """Run the parts, print their rows and claims."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
+    parser.add_argument("--only", action="append", choices=PARTS, help="a part of it")
     parser.add_argument("--seeds", type=int, default=4, help="default: 4")
+    parser.add_argument(
+        "--drivers", type=int, default=2, help="drivers whose stops are pressed at once; default: 2"
+    )
     add_ending(
         parser, "1 seed, 300 goals, 84 presses, 60 loads, 300 requests, 5 minutes of driving"
     )
     given = parser.parse_args()
-    counts = (300, 84, 60, 300, 70) if given.quick else (4_000, 1_000, 500, 5_000, 500)
-    makers = (goal_row, stop_row, load_row, fuzz_row, deviation_row)
     rows: list[dict[str, Any]] = []
-
-    def show(row: dict[str, Any]) -> None:
-        rows.append(row)
-        print(line_of(row), flush=True)
-
-    show(driving_row(HOUR / 12.0 if given.quick else HOUR))
-    for seed in range(FIRST_SEED, FIRST_SEED + (1 if given.quick else given.seeds)):
-        for make, count in zip(makers, counts, strict=True):
-            show(make(count, seed))
-    show(sequence_row(50, 200) if given.quick else sequence_row(2_000, 200))
-    for row in walk_rows(4 if given.quick else 8):
-        show(row)
-    show(writers_row(200))
-    show(cells_row())
-    show(killed_row(1 if given.quick else 5))
-    for row in attack(200, 12) if given.quick else attack(5_000, 334):
-        show(row)
-    show(stops_row(50, FIRST_SEED) if given.quick else stops_row(10_000, FIRST_SEED))
-    for row in floods(20) if given.quick else floods(1_000):
-        show(row)
-    finish(given.json, rows, claims_of(rows))
+    claims: list[Claim] = []
+    for name in given.only or PARTS:
+        make, claimed = PARTS[name]
+        found = []
+        for row in make(given):
+            found.append(row)
+            print(line_of(row), flush=True)
+        rows += found
+        claims += claimed(Rows(found))
+    finish(given.json, rows, claims)
 
 
 if __name__ == "__main__":

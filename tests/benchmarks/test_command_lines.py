@@ -19,7 +19,8 @@ OTHERS = {
     "soak": {"--minutes", "--quick", "--json"},  # one cell for an hour
     "recording": {"--seconds", "--minutes", "--quick", "--json"},
     "paper": {"--only", "--again", "--seeds", "--quick", "--json"},  # each claim names its cells
-    "hostile": {"--seeds", "--quick", "--json"},  # one cell: it asks for the driver
+    # one cell: it asks for the driver
+    "hostile": {"--only", "--seeds", "--drivers", "--quick", "--json"},
     "strangers": {"--seeds", "--quick", "--json"},  # files, no cells
     "requests": {"--only", "--cases", "--quick", "--json"},  # each kind draws cells of its own
 }
