@@ -76,6 +76,25 @@ def test_the_answer_names_the_program_that_costs_least(analysis: Analysis, other
     assert "<b>None is shown to cost less than demo</b>" in alike
 
 
+@pytest.mark.parametrize(("within", "said"), [(None, False), ((0.1, 10.0), True)])
+def test_a_run_costs_what_its_plan_predicts_only_where_that_is_shown(
+    analysis: Analysis, within: tuple[float, float] | None, said: bool
+) -> None:
+    """Without an interval of the plan it stood beside any deviation."""
+    bare = replace(analysis.recording, power=None, joints=None, controller=None, hardware="")
+    steps = tuple(result.step.movement for result in analysis.steps)
+    energy = sum(step.report.energy for step in steps)
+    ends = tuple(share * energy for share in within or (1.0, 1.0))
+    recording = replace(bare, events=(), planned=steps, path=Path("plan.mcap"))
+    plan = analyse(replace(recording, planned_interval=ends))
+    for pair in ((analysis, plan), (plan, analysis)):
+        page = page_of(*pair)
+        assert ("The run costs what its plan predicts" in page) == said
+        assert ("both cost alike" in page) == said
+        assert ("The run against the plan: " in page) != said
+        assert " costs least" not in page
+
+
 def test_power_on_the_common_grid_keeps_the_peaks_of_the_meter(
     analysis: Analysis, other: Analysis, data_of: Any
 ) -> None:

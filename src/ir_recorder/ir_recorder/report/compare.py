@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -165,17 +165,20 @@ def _answer(analyses: Sequence[Analysis], names: Sequence[str], costs: Costs) ->
     if intervals:
         sure.insert(0, f"90 % intervals: {', '.join(intervals)}.")
     do = []
-    if least == names[0] and all(year.low > first.high for year in list(known.values())[1:]):
+    pair = len(names) == _BESIDE and len(driven) == 1
+    if pair and not intervals:
+        off = percent(known[driven[0]].value / _other(known, driven[0]).value - 1.0)
+        result = f"The run against the plan: {off}"
+        do.append("In shifts: nothing, as the plan has no interval to tell it from chance.")
+    elif least == names[0] and all(year.low > first.high for year in list(known.values())[1:]):
         result = f"{least} costs least"
         do.append(f"Keep {least}.")
     elif known[least].high < first.low:
         less = yearly_money(first.value - known[least].value, costs.currency)
         result = f"{least}: {less} less a year"
         do.append(f"Drive {least}.")
-    elif len(names) == _BESIDE and len(driven) == 1:
-        (run,) = driven
-        (plan,) = (name for name in names if name != run)
-        off = percent(known[run].value / known[plan].value - 1.0)
+    elif pair:  # the run lies in the interval of the plan
+        off = percent(known[driven[0]].value / _other(known, driven[0]).value - 1.0)
         result = f"The run costs what its plan predicts, {off}"
         do.append("In shifts: nothing, both cost alike.")
     else:
@@ -186,6 +189,11 @@ def _answer(analyses: Sequence[Analysis], names: Sequence[str], costs: Costs) ->
         do += first_steps((), idle, costs)
         sure.append(f"What nights save is {idle.basis}.")
     return Answer(result, words, sure, do, a_night(idle, costs), counted=counted_at(costs))
+
+
+def _other(known: Mapping[str, Amount], name: str) -> Amount:
+    """The year of the second of two recordings."""
+    return next(year for other, year in known.items() if other != name)
 
 
 _NAMED = 4  # recordings in a sentence
