@@ -85,6 +85,14 @@ def long_names(analysis: Analysis) -> str:
     return report(analyse(replace(recording, events=events, facts=facts)))
 
 
+def plan(analysis: Analysis) -> str:
+    """The plan of a recording, which nobody drove."""
+    steps = tuple(result.step.movement for result in analysis.steps)
+    bare = replace(analysis.recording, power=None, joints=None, controller=None, hardware="")
+    facts = (("plan", "never driven"),)
+    return report(analyse(replace(bare, events=(), planned=steps, facts=facts)))
+
+
 def recordings(analysis: Analysis) -> str:
     checked = (analysis, findings(analysis))
     return comparison_html([checked, checked, checked])
@@ -170,6 +178,7 @@ def layout(_: Analysis) -> str:
 
 PAGES: dict[str, Callable[[Analysis], str]] = {
     "report": report,
+    "plan": plan,
     "parts": report,
     "empty report": empty,
     "long names": long_names,
@@ -216,6 +225,17 @@ def test_nothing_is_cut_overlaps_or_scrolls_and_axe_finds_nothing(
             faults[f"{size}, axe"] = page.run(f"{FOUND}({DARK if size == 'phone' else '{}'})")
         page.close()
     assert {size: found for size, found in faults.items() if found} == {}
+
+
+@pytest.mark.long
+def test_no_two_kinds_of_pages_have_the_same_title(analysis: Analysis) -> None:
+    """Those of a plan and of a comparison were both called "what the plan saves"."""
+    kinds = [name for name in PAGES if name not in (*SAME, "parts")]
+    titles: dict[str, list[str]] = {}
+    for name in kinds:
+        title = PAGES[name](analysis).partition("<title>")[2].partition("</title>")[0]
+        titles.setdefault(title.rpartition(": ")[2], []).append(name)
+    assert all(len(own) == 1 for own in titles.values()), titles
 
 
 HEADS = """[...document.querySelectorAll("main h2")].filter((each) => {

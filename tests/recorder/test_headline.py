@@ -96,8 +96,8 @@ def test_a_plan_without_a_comparison_is_called_what_it_costs(analysis: Analysis)
     alone = analyse(replace(plan, savings=(), facts=(("plan", "never driven"),)))
     page = report_html(alone, ())
     answer = page.split('id="answer"')[1].partition("</section>")[0]
-    assert "what the plan costs" in page
-    assert "what the plan saves" not in page
+    assert "the plan and what it costs" in page
+    assert "the plan and what it saves" not in page
     assert "at night and at weekends, in hibernation" in answer  # as each year of a plan
     assert "ibernation" in answer
     assert "No comparison in this file" in answer

@@ -165,7 +165,7 @@ def _subject(analysis: Analysis) -> str:
     """What the page is about."""
     if not analysis.recording.never_driven:
         return "the recorded run"
-    return "what the plan costs" if analysis.savings is None else "what the plan saves"
+    return f"the plan and what it {'costs' if analysis.savings is None else 'saves'}"
 
 
 def _pace(analysis: Analysis) -> str:

@@ -566,7 +566,7 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
         "rests": long_rests([rests_of(side) for side in there]),
     }
     parts = {
-        "title": text(f"{cell.name}: what the plan saves"),
+        "title": text(f"{cell.name}: {program_before(found)} and the plan compared"),
         "subtitle": text(
             f"{PLANNED} against {program_before(found)} ({found.name}, {found.kind}), same stops"
             if found.kind != COMMON
