@@ -223,6 +223,24 @@ def test_what_can_not_be_planned_ends_with_one(capsys: pytest.CaptureFixture[str
     assert said.endswith(f"\nnote: {DOORS}\n")
 
 
+@pytest.mark.parametrize(
+    ("command", "what"),
+    [
+        (["move", "open", "{}", "park"], "start"),
+        (["move", "open", "home", "{}"], "goal"),
+        (["state", "open", "{}"], "state"),
+    ],
+)
+def test_a_place_that_is_refused_is_named_by_its_argument(
+    command: list[str], what: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [word.format("A1 186 A2 -90 A3 90 A4 0 A5 0 A6 0") for word in command]
+    assert main(["ask", *words]) == 2
+    said = capsys.readouterr().err
+    assert f"{what}: joint_a1 is 186 deg" in said
+    assert ("ir ask escape" in said) == (what != "goal")
+
+
 def test_an_interrupt_ends_with_130_and_a_clean_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

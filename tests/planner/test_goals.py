@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import re
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,10 +14,25 @@ from hypothesis import strategies as st
 
 from ir_description import load_cell
 from ir_msgs_py.status import StatusCode
+from ir_planner import Planner
 from ir_planner.errors import RequestError
 from ir_planner.request.goals import one_goal, parse_goal
 
 CELL = load_cell("demo")
+PLANNER = Planner("demo", clock=lambda: 0.0)
+START = StatusCode.START_STATE_INVALID
+STATE = StatusCode.INVALID_ROBOT_STATE
+ASKED: dict[str, Callable[[Any], object]] = {
+    "start": lambda place: PLANNER.plan_regional(start=place, goal="park"),
+    "start of a program": lambda place: PLANNER.plan_program(start=place),
+    "start of an escape": lambda place: PLANNER.plan_escape(start=place),
+    "state": lambda place: PLANNER.check_state(place),
+    "near": lambda place: PLANNER.compute_ik("lathe_work", near=place),
+    "near of a service movement": lambda place: PLANNER.plan_service("lathe_work", near=place),
+    "via 1": lambda place: PLANNER.plan_regional(goal="park", via=[place]),
+    "goal": lambda place: PLANNER.plan_regional(goal=place),
+}
+CODES = {"start": START, "state": STATE, "near": STATE}
 
 
 def test_a_station_is_its_pose_and_keeps_its_name() -> None:
@@ -78,6 +95,41 @@ def test_what_is_no_goal_is_named(text: str, code: StatusCode | None, says: str)
     with pytest.raises(RequestError, match=re.escape(says)) as caught:
         parse_goal(text, CELL)
     assert caught.value.code == code
+
+
+@pytest.mark.parametrize("asked", ASKED)
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("A1 x A2 -90 A3 90 A4 0 A5 -5 A6 0", "{what}: A1 is 'x': it must be a finite number"),
+        ("A1 10 A2 -90", "{what} names A1 A2: it must give each of"),
+        ("ho\0me", "{what} has 5 characters: it must be one line of 1 to 300"),
+        ("X 1e9 Y 0 Z 1 A 0 B 0 C 0", "{what} lies at (1e+09, 0, 1) m"),
+    ],
+)
+def test_a_text_that_is_no_place_is_refused_by_the_name_and_code_of_its_argument(
+    asked: str, text: str, says: str
+) -> None:
+    what = asked.partition(" of ")[0]
+    with pytest.raises(RequestError, match="^" + re.escape(says.format(what=what))) as caught:
+        ASKED[asked](text)
+    assert caught.value.code == CODES.get(what, StatusCode.INVALID_GOAL_CONSTRAINTS)
+
+
+@pytest.mark.parametrize("asked", ["start", "start of a program", "state", "near", "via 1", "goal"])
+@pytest.mark.parametrize("angle", [186.0, 190.0, 720.0])
+def test_a_text_beyond_a_limit_is_refused_as_the_same_array_is(asked: str, angle: float) -> None:
+    """Code, sentence and advice: a start just beyond a limit is led back by plan_escape."""
+    q = [angle, -90.0, 90.0, 0.0, -5.0, 0.0]
+    text = " ".join(f"A{i} {value:g}" for i, value in enumerate(q, start=1))
+    refusals = []
+    for place in (text, np.radians(q)):
+        with pytest.raises(RequestError) as caught:
+            ASKED[asked](place)
+        refusals.append((caught.value.code, str(caught.value)))
+    assert refusals[0] == refusals[1]
+    assert refusals[0][1].startswith(f"{asked.partition(' of ')[0]}: joint_a1 is {angle:g} deg")
+    assert ("plan_escape" in refusals[0][1]) == (asked.startswith("start") and angle < 200.0)
 
 
 def test_exactly_one_form_is_taken() -> None:

@@ -316,7 +316,7 @@ def run_check(arguments: argparse.Namespace) -> int:
     load = arguments.load
     with sentences():
         planner = planner_of(arguments.cell)
-        q = configuration_of(arguments.state, planner, margin, load)
+        q = configuration_of(arguments.state, planner, margin, load, "state")
         found = planner.check_state(
             q,
             safety_distance=margin,

@@ -21,6 +21,7 @@ from ir_krl import KrlError
 from ir_msgs_py.options import NO_TILT, OBJECTIVES, ROBOTS_TIME_VALUE, PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.savings import one_sided
+from ir_msgs_py.status import StatusCode
 from ir_planner import Goal, Planner, PlannerSettings, RequestError, parse_goal
 from ir_planner.program import AS_THE_CELL_SAYS
 from ir_values.arrays import FloatArray
@@ -71,10 +72,17 @@ def planner_of(cell: str, power_parameters: str = "") -> Planner:
     return planner
 
 
-def goal_of(text: str, planner: Planner) -> Goal:
-    """What a person types as a goal; a mistyped station is answered with the one that was meant."""
+def goal_of(
+    text: str,
+    planner: Planner,
+    what: str = "goal",
+    code: StatusCode = StatusCode.GOAL_STATE_INVALID,
+) -> Goal:
+    """What a person types as a goal, or as what `what` and `code` say (see parse_goal); a mistyped
+    station is answered with the one that was meant.
+    """
     try:
-        return parse_goal(text, planner.cell)
+        return parse_goal(text, planner.cell, what, code)
     except RequestError:
         if nearest(text, _places(planner)):
             check_stations([text], planner)
@@ -96,11 +104,13 @@ def _places(planner: Planner) -> list[str]:
     return [*(station.name for station in planner.cell.stations), "home", "park"]
 
 
-def configuration_of(text: str, planner: Planner, margin: float, load: str = "") -> FloatArray:
+def configuration_of(
+    text: str, planner: Planner, margin: float, load: str = "", what: str = "start"
+) -> FloatArray:
     """Joint values (n,) rad of a posture or of values in degrees; at a station or a pose, the free
-    configuration that is nearest to home.
+    configuration that is nearest to home. what: its name where it is refused.
     """
-    goal = goal_of(text, planner)
+    goal = goal_of(text, planner, what, StatusCode.START_STATE_INVALID)
     if goal.configuration is not None:
         return goal.configuration
     answer = planner.compute_ik(

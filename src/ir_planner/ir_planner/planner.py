@@ -455,7 +455,7 @@ class Planner:
         scene = self.scene(options.load)
         scene.allowed(station)  # an unknown one is refused here
         if isinstance(start, str):
-            begin = joints_of(start, self.cell)
+            begin = joints_of(start, self.cell, "start", _START)
             start = self._configuration(start, "start", _START) if begin is None else begin
         q = start.configuration if isinstance(start, Goal) else start
         if q is None:
@@ -680,28 +680,24 @@ class Planner:
         stops = 3 * len(cell.route.visits) if cell.route is not None else len(cell.program)
         return request, self._work(options, cancelled, max(stops, 1))
 
-    def _goal(self, goal: Place) -> Goal:
-        """The goal as a value, joint values within their limits. Raises RequestError."""
+    def _goal(self, goal: Place, what: str = "goal") -> Goal:
+        """The goal as a value, joint values within their limits. Raises RequestError, which names
+        `what`.
+        """
         if isinstance(goal, str):
-            return parse_goal(goal, self.cell)
+            return parse_goal(goal, self.cell, what)
         if not isinstance(goal, Goal):
             goal = Goal(pose=goal) if np.shape(goal) == (4, 4) else Goal(configuration=goal)
         if goal.configuration is None:
-            _check_pose(goal)
+            _check_pose(goal, what)
             return goal
         code = StatusCode.GOAL_STATE_INVALID
-        q = within_limits(goal.configuration, self.cell, "goal", code)
+        q = within_limits(goal.configuration, self.cell, what, code)
         return replace(goal, configuration=q)
 
     def _places(self, via: Sequence[Place]) -> tuple[Goal, ...]:
         """Places on the way as values. Raises RequestError, which names the place."""
-        places = []
-        for k, place in enumerate(via, start=1):
-            try:
-                places.append(self._goal(place))
-            except RequestError as error:
-                raise RequestError(error.code, f"via {k}: {error}") from error
-        return tuple(places)
+        return tuple(self._goal(place, f"via {k}") for k, place in enumerate(via, start=1))
 
     def _configuration(self, place: Place | None, what: str, code: StatusCode) -> FloatArray:
         """Joint values (n,) of a posture, a text or an array, None: machine home. Raises
@@ -710,7 +706,7 @@ class Planner:
         if place is None:
             return np.array(self.cell.machine_home)
         if isinstance(place, str):
-            place = parse_goal(place, self.cell, what)
+            place = parse_goal(place, self.cell, what, code)
         q = place.configuration if isinstance(place, Goal) else place
         if q is None:
             raise RequestError(
@@ -741,10 +737,10 @@ class Planner:
         return Work(most, deadline, self.clock, cancelled, improvement)
 
 
-def _check_pose(goal: Goal) -> None:
-    """Raises RequestError where a goal's pose is none."""
+def _check_pose(goal: Goal, what: str) -> None:
+    """Raises RequestError, which names `what`, where a goal's pose is none."""
     try:
-        rigid_pose(np.asarray(goal.pose), "goal")
+        rigid_pose(np.asarray(goal.pose), what)
     except KernelError as error:
         raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, str(error)) from error
 

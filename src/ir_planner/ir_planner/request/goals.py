@@ -10,11 +10,12 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ir_description import Cell
+from ir_description import Cell, RobotModel
 from ir_description.poses import rotation_from_abc
 from ir_description.robot import LIMIT_TOLERANCE, OUTSIDE_MAX
 from ir_msgs_py.status import StatusCode
@@ -76,77 +77,95 @@ def one_goal(
     return Goal(pose=pose)
 
 
-@typed(unfit)
-def parse_goal(text: str, cell: Cell, what: str = "goal") -> Goal:
-    """The goal of a text. Raises RequestError: what is wrong, and what may stand there; `what`: its
-    name in the sentence.
+class _Asked(NamedTuple):
+    """What a text is given for: its name in sentences, the code where it can't be read, and the
+    code where its values lie beyond limits.
     """
+
+    what: str
+    unreadable: StatusCode
+    beyond: StatusCode
+
+    @classmethod
+    def of(cls, what: str, code: StatusCode) -> "_Asked":
+        """MoveIt has a code of its own for a goal that can't be read, and none for a start."""
+        is_goal = code == StatusCode.GOAL_STATE_INVALID
+        return cls(what, StatusCode.INVALID_GOAL_CONSTRAINTS if is_goal else code, code)
+
+
+@typed(unfit)
+def parse_goal(
+    text: str, cell: Cell, what: str = "goal", code: StatusCode = StatusCode.GOAL_STATE_INVALID
+) -> Goal:
+    """The goal of a text, or a start, a state: `what`, its name in the sentence, and `code`, that
+    of values beyond limits. Raises RequestError: what is wrong, and what may stand there.
+    """
+    asked = _Asked.of(what, code)
     stripped = text.strip()
     if len(stripped) > _TEXT_MAX or not stripped.isprintable():
         raise RequestError(
-            StatusCode.INVALID_GOAL_CONSTRAINTS,
-            f"{what} has {len(text)} characters: it must be one line of 1 to 300",
+            asked.unreadable,
+            f"{what} has {len(text)} characters: it must be one line of 1 to {_TEXT_MAX}",
         )
-    stripped, rail = _with_rail(stripped, cell, what)
+    stripped, rail = _with_rail(stripped, cell, asked)
     for station in cell.stations:
         if station.name == stripped:
             return Goal(pose=station.pose, station=station.name, text=stripped, rail=rail)
     if stripped.lower() in POSTURES:
         return Goal(configuration=cell.posture(stripped.lower()), text=stripped.lower())
-    words, keys = _words(stripped)
-    joints = joints_of(stripped, cell)
+    joints = joints_of(stripped, cell, what, code)
     if joints is not None:
-        q = within_limits(joints, cell, what, StatusCode.GOAL_STATE_INVALID)
-        return Goal(configuration=q, text=stripped)
-    if len(words) > 1 and keys[0] in _POSE_KEYS:
-        pose = _pose(_numbers(keys, words[1::2], dict.fromkeys(_POSE_KEYS, "")))
+        return Goal(configuration=within_limits(joints, cell, what, code), text=stripped)
+    keys, values = _pairs(stripped)
+    if values and keys[0] in _POSE_KEYS:
+        pose = _pose(_numbers(keys, values, dict.fromkeys(_POSE_KEYS, ""), asked), asked)
         return Goal(pose=pose, text=stripped, rail=rail)
     texts = ('"A1 0 A2 -90 ..." in degrees', '"X 1.8 Y 0 Z 1.2 A 0 B 90 C 0"')
     raise unknown_name(what, stripped, [*(s.name for s in cell.stations), *POSTURES, *texts])
 
 
-def joints_of(text: str, cell: Cell) -> FloatArray | None:
-    """Joint values (n,) rad of a text in degrees, wherever they lie; None: it is another goal.
-    Raises RequestError.
+def joints_of(text: str, cell: Cell, what: str, code: StatusCode) -> FloatArray | None:
+    """Joint values (n,) rad of a text in degrees, wherever they lie; None: it is something else.
+    Raises RequestError, as parse_goal with this `what` and `code`.
     """
-    words, keys = _words(text)
     robot = cell.robot
-    joints = {robot.axis_label(i).upper(): robot.unit(i) for i in range(robot.n)}
-    if len(words) < 2 or keys[0] not in joints:
+    units = {robot.axis_label(i).upper(): robot.unit(i) for i in range(robot.n)}
+    keys, values = _pairs(text)
+    if not values or keys[0] not in units:
         return None
-    return robot.from_people_units(np.array(_numbers(keys, words[1::2], joints)))
+    return robot.from_people_units(np.array(_numbers(keys, values, units, _Asked.of(what, code))))
 
 
-def _with_rail(text: str, cell: Cell, what: str) -> tuple[str, float | None]:
+def _with_rail(text: str, cell: Cell, asked: _Asked) -> tuple[str, float | None]:
     """A text without "E1 2.5" at its end, and that place [m] of the rail; None: it gives none."""
     robot = cell.robot
     words = text.split()
     if robot.rail is None or len(words) < 3 or words[-2].upper() != robot.rail.name.upper():
         return text, None
     label = robot.rail.name
-    place = _numbers([label], words[-1:], {label: "m"})[0]
+    place = _numbers([label], words[-1:], {label: "m"}, asked)[0]
     if not robot.rail.low <= place <= robot.rail.high:
         raise RequestError(
-            StatusCode.GOAL_STATE_INVALID,
-            f"{what}: {label} is {place:g} m: it must be in [{robot.rail.low:g}, "
+            asked.beyond,
+            f"{asked.what}: {label} is {place:g} m: it must be in [{robot.rail.low:g}, "
             f"{robot.rail.high:g}] m",
         )
     return " ".join(words[:-2]), place
 
 
-def _words(text: str) -> tuple[list[str], list[str]]:
-    """The words of a text, and every second one in capitals."""
+def _pairs(text: str) -> tuple[list[str], list[str]]:
+    """The keys of a text "A1 10 A2 20" in capitals, and what stands behind each."""
     words = _WORDS.findall(text.replace(",", " ").replace("=", " "))
-    return words, [word.upper() for word in words[::2]]
+    return [word.upper() for word in words[::2]], words[1::2]
 
 
-def _pose(values: list[float]) -> FloatArray:
+def _pose(values: list[float], asked: _Asked) -> FloatArray:
     """Pose (4, 4) of X, Y, Z [m] and A, B, C [deg] within the workspace; else RequestError."""
     x, y, z, *abc = values
     if max(abs(x), abs(y), abs(z)) > _LENGTH_MAX:
         raise RequestError(
-            StatusCode.INVALID_GOAL_CONSTRAINTS,
-            f"goal lies at ({x:g}, {y:g}, {z:g}) m: X, Y and Z must be in "
+            asked.unreadable,
+            f"{asked.what} lies at ({x:g}, {y:g}, {z:g}) m: X, Y and Z must be in "
             f"[-{_LENGTH_MAX:g}, {_LENGTH_MAX:g}] m",
         )
     pose = np.eye(4)
@@ -182,14 +201,11 @@ def within_limits(q: ArrayLike, cell: Cell, what: str, code: StatusCode) -> Floa
             )
         excess = max(float(value) - high, low - float(value))
         if excess > LIMIT_TOLERANCE:
-            shown, beyond = (
-                robot.shown(i, size) if i < robot.base else _angle(size)
-                for size in (float(value), excess)
-            )
             raise RequestError(
                 code,
-                f"{what}: {robot.joint_names[i]} is {shown}: it must be in "
-                f"{robot.shown_range(i)}, exceeded by {beyond}{_hint(code, excess)}",
+                f"{what}: {robot.joint_names[i]} is {_shown(value, i, robot)}: it must be in "
+                f"{robot.shown_range(i)}, exceeded by {_shown(excess, i, robot)}"
+                f"{_hint(code, excess)}",
             )
     return np.clip(q, robot.position_min, robot.position_max)
 
@@ -201,17 +217,23 @@ def _hint(code: StatusCode, excess: float) -> str:
     return "; plan_escape (ir ask escape) leads back"
 
 
-def _angle(value: float) -> str:
-    """An angle [rad] in degrees, or as it came where that is no angle any more."""
+def _shown(value: float, i: int, robot: RobotModel) -> str:
+    """A value of joint i with its unit: metres of a rail; an angle [rad] in degrees, or as it came
+    where that is no angle any more.
+    """
+    if i < robot.base:
+        return robot.shown(i, float(value))
     return f"{math.degrees(value):g} deg" if abs(value) < _NO_ANGLE else f"{value:g} rad"
 
 
-def _numbers(keys: list[str], values: list[str], expected: Mapping[str, str]) -> list[float]:
+def _numbers(
+    keys: list[str], values: list[str], expected: Mapping[str, str], asked: _Asked
+) -> list[float]:
     """Numbers in the order of `expected`, which has the unit of each; every key once."""
     if sorted(keys) != sorted(expected) or len(values) != len(keys):
         raise RequestError(
-            StatusCode.INVALID_GOAL_CONSTRAINTS,
-            f"goal names {' '.join(keys)[:80]}: it must give each of "
+            asked.unreadable,
+            f"{asked.what} names {' '.join(keys)[:80]}: it must give each of "
             f"{' '.join(expected)} once, with a number",
         )
     numbers: dict[str, float] = {}
@@ -223,8 +245,8 @@ def _numbers(keys: list[str], values: list[str], expected: Mapping[str, str]) ->
         if not math.isfinite(number):
             needed = f"a finite number {expected[key]}".rstrip()
             raise RequestError(
-                StatusCode.INVALID_GOAL_CONSTRAINTS,
-                f"goal: {key} is {value[:20]!a}: it must be {needed}",
+                asked.unreadable,
+                f"{asked.what}: {key} is {value[:20]!a}: it must be {needed}",
             )
         numbers[key] = number
     return [numbers[key] for key in expected]
@@ -240,16 +262,18 @@ def motion_of(
     where both rest. Raises RequestError.
     """
     motion = np.zeros((2, 2, cell.robot.n))
-    codes = (StatusCode.START_STATE_INVALID, StatusCode.GOAL_STATE_INVALID)
-    for k, (values, what, code) in enumerate(
-        zip((start, goal), ("start", "goal"), codes, strict=True)
-    ):
-        for i, (given, kind) in enumerate(zip(values, ("velocity", "acceleration"), strict=True)):
-            if given is None:
-                continue
-            motion[k, i] = joint_values(given, (cell.robot.n,), f"{what}_{kind}", code)
-            if not np.isfinite(motion[k, i]).all():
-                raise RequestError(code, f"{what}_{kind} is {given}: it must be finite")
+    given = {
+        "start_velocity": (start[0], motion[0, 0], StatusCode.START_STATE_INVALID),
+        "start_acceleration": (start[1], motion[0, 1], StatusCode.START_STATE_INVALID),
+        "goal_velocity": (goal[0], motion[1, 0], StatusCode.GOAL_STATE_INVALID),
+        "goal_acceleration": (goal[1], motion[1, 1], StatusCode.GOAL_STATE_INVALID),
+    }
+    for what, (values, place, code) in given.items():
+        if values is None:
+            continue
+        place[:] = joint_values(values, (cell.robot.n,), what, code)
+        if not np.isfinite(place).all():
+            raise RequestError(code, f"{what} is {values}: it must be finite")
     if motion[1].any() and end.configuration is None:
         raise RequestError(
             StatusCode.GOAL_STATE_INVALID,
