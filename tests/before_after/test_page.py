@@ -31,7 +31,7 @@ from ir_recorder.report.number_text import (
 from ir_recorder.report.program_comparison import (
     before_after_columns,
     before_after_html,
-    demand_of,
+    quarter_of,
     write_before_after_table,
     year_of,
 )
@@ -102,10 +102,19 @@ def test_the_largest_quarter_of_an_hour_is_compared(
     row = page.split(">largest quarter of an hour</td>")[1].split("</tr>")[0]
     for side in (compared.today, compared.planned):
         mean = side.report.energy / side.report.duration
-        assert mean <= demand_of(side) <= side.report.peak_power
-        assert watts(demand_of(side)) in row
+        assert mean <= quarter_of(side) <= side.report.peak_power
+        assert watts(quarter_of(side)) in row
+    controller = planner.cell.robot.controller
+    rests = home_watts(planner.cell, compared.planned.movements[-1].load, controller)
     priced = before_after_html(compared, planner.cell, Costs(demand_price=100.0))
-    assert money(demand_of(compared.planned) / 10.0, "EUR") in priced
+    largest = max(quarter_of(compared.planned), rests["HIBERNATION"])
+    assert f"<b>{watts(largest)}</b>" in row
+    assert money(largest / 10.0, "EUR") in priced
+    # today's controller rests on closed brakes at night, and what is said counts all hours
+    before = max(quarter_of(compared.today), rests["STAND_ON_BRAKES"])
+    assert f"<b>{watts(before)}</b>" in row
+    assert watts(rests["HIBERNATION"]) in row
+    assert "at night and at weekends" in row
 
 
 def test_an_interval_with_zero_in_it_says_so(compared: BeforeAfter, planner: Planner) -> None:

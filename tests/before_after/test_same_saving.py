@@ -15,7 +15,7 @@ from ir_recorder.analysis.production import production_of
 from ir_recorder.report import report_html
 from ir_recorder.report.costs import Costs
 from ir_recorder.report.money_text import yearly_money
-from ir_recorder.report.program_comparison import before_after_html, year_of
+from ir_recorder.report.program_comparison import before_after_html, quarter_of, year_of
 
 
 @pytest.mark.long
@@ -27,6 +27,9 @@ def test_comparison_and_report_of_a_plan_show_one_saving(
     analysis = analyse(read_recording(file))
     cycle = production_of(analysis)
     assert cycle is not None
+
+    assert cycle.savings is not None
+    assert cycle.savings.common_demand == pytest.approx(quarter_of(common.today), rel=1e-9)
 
     rng = np.random.default_rng(0)
     for low, high in ((0.05, 0.2), (0.2, 0.5), (0.5, 1.0)):

@@ -66,6 +66,8 @@ def write_plan(
         facts[_DOORS] = doors[0].removeprefix(_DOORS_ARE)
     if plan.savings.common_seconds > 0.0:
         facts[contents.COMMON_SECONDS] = f"{plan.savings.common_seconds!r} s"
+    if plan.savings.common_demand > 0.0:
+        facts[contents.COMMON_DEMAND] = f"{plan.savings.common_demand!r} W"
     session = RecordingSession(writer, facts, now)
     urdf = robot_urdf(cell.robot, cell.tool, cell.tcp, cell.base_pose)
     session.attach_cell(CellFiles(cell_to_yaml(cell), urdf), now)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ir_description.robot import ROBOTS
 from ir_msgs_py.report import PlannedMovement
-from ir_msgs_py.savings import ProgramSavings, Saving
+from ir_msgs_py.savings import ProgramSavings, Saving, largest_quarter
 from ir_planner.checks import interval
 from ir_planner.errors import RequestError, TimingError
 from ir_planner.program.blending import timed_with_blends
@@ -163,7 +163,14 @@ def savings_of(
         pauses=Saving(*resting, duration_of(standing), saved[1].low, saved[1].high),
         across=program.across,
         around=program.around,
+        common_demand=_demand(common),
     )
+
+
+def _demand(steps: Steps) -> float:
+    """The largest mean power [W] of a quarter of an hour of these steps, repeated."""
+    seconds = np.array([step.duration for step in steps])
+    return largest_quarter(seconds, np.array([step.report.energy for step in steps]))
 
 
 def _spreads(

@@ -18,7 +18,7 @@ from ir_description.robot import interval_over
 from ir_msgs_py.modes import REST_MODES
 from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.report import PlannedMovement
-from ir_msgs_py.savings import ProgramSavings, Saving
+from ir_msgs_py.savings import ProgramSavings, Saving, largest_quarter
 from ir_recorder.analysis.flows import EnergyFlows, energy_flows
 from ir_recorder.analysis.loads import carried
 from ir_recorder.analysis.meter import Meter
@@ -40,7 +40,6 @@ from ir_recorder.analysis.steps import step_label
 from ir_recorder.analysis.tending import Span, Tending
 from ir_recorder.format import contents
 from ir_recorder.reading.recording import Recording
-from ir_values.arrays import FloatArray
 
 ENDED = "ended"  # outcome of a step
 PREDICTED = "predicted"
@@ -427,8 +426,6 @@ def _full_savings(
 
 # Beside the cycle: the largest quarter of an hour, and rest while nobody works.
 
-QUARTER = 900.0  # s: over which suppliers measure demand
-
 
 def driven_and_predicted(analysis: Analysis) -> tuple[float, float]:
     """Joules of all that was driven, waiting included, and what was predicted of it; NaN where one
@@ -461,20 +458,6 @@ def demand_watts(analysis: Analysis, cycle: Production) -> float:
     if not len(rows) or seconds.sum() <= 0.0 or not np.isfinite(joules).all():
         return cycle.energy / cycle.seconds
     return largest_quarter(seconds, joules)
-
-
-def largest_quarter(seconds: FloatArray, joules: FloatArray) -> float:
-    """The largest mean power [W] of a quarter of an hour of a cycle that is repeated: stretches
-    (N,) of so many seconds, in their order, each at its mean power.
-    """
-    repeated = 2 + int(QUARTER / seconds.sum())
-    ends = np.concatenate(([0.0], np.cumsum(np.tile(seconds, repeated))))
-    energy = np.concatenate(([0.0], np.cumsum(np.tile(joules, repeated))))
-    # the largest window begins or ends where a step does
-    starts = np.concatenate((ends, ends - QUARTER))
-    starts = starts[(starts >= 0.0) & (starts <= ends[-1] - QUARTER)]
-    found = np.interp(starts + QUARTER, ends, energy) - np.interp(starts, ends, energy)
-    return float(found.max() / QUARTER)
 
 
 def stretches(analysis: Analysis) -> list[tuple[float, float]]:

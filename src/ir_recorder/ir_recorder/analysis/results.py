@@ -224,6 +224,12 @@ class ProgramTotals:
         )
 
 
+def _number(fact: str, unit: str) -> float:
+    """The number of a fact with its unit; 0 where it says none."""
+    found = re.fullmatch(rf"(\d+\.\d+) {unit}", fact)
+    return float(found[1]) if found else 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class Analysis:
     """All results; parts whose topics are missing are empty or NaN, `problems` names which and why.
@@ -259,8 +265,11 @@ class Analysis:
         known = [event.savings for event in self.recording.savings if event.time <= begin]
         if not known or not known[-1].available:
             return None
-        longer = re.fullmatch(r"(\d+\.\d+) s", self.recording.fact(contents.COMMON_SECONDS))
-        return replace(known[-1], common_seconds=float(longer[1])) if longer else known[-1]
+        return replace(
+            known[-1],
+            common_seconds=_number(self.recording.fact(contents.COMMON_SECONDS), "s"),
+            common_demand=_number(self.recording.fact(contents.COMMON_DEMAND), "W"),
+        )
 
     @property
     def axes(self) -> tuple[str, ...]:

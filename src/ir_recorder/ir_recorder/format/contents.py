@@ -47,6 +47,8 @@ PLAN: Final = "plan"  # "never driven": a plan, found or not, without a robot
 # full lengths of the pauses in power modes: "180 s, 1800 s"
 UNSHORTENED_PAUSES: Final = "unshortened_pauses"
 COMMON_SECONDS: Final = "common_program"  # what it takes where that is longer: "115.34 s"
+# its largest mean power of a quarter of an hour, of a plan that nobody drove: "408.2 W"
+COMMON_DEMAND: Final = "common_program_demand"
 # how many power modes with a load it visits at machine home: "8"
 MODES_AT_REST: Final = "modes_at_rest"
 CYCLES: Final = "cycles"  # how many whole cycles the program of each robot is made of: "3"

@@ -36,13 +36,16 @@ from ir_recorder.reading.reader import read_recording
 from ir_recorder.report.answer import Answer
 from ir_recorder.report.costs import (
     COMMON,
+    DEMAND_LEAVES_OUT,
     LEFT_ALONE,
     Costs,
+    Demand,
     IdleSaving,
     assumed_section,
     computed_words,
     counted_with,
     demand_note,
+    demand_of,
     following_price,
     idle_money,
     idle_saving,
@@ -192,7 +195,8 @@ MOST = 200  # recordings of a fleet
 class Member:
     """A recording of a robot. robot: the folder that the file lies in, or its own name; cycle: what
     its program takes in production; measures: joules of a cycle that each could save at most;
-    demand [W]: of its largest quarter of an hour; idle [W]: at rest by power mode; month: of its
+    demand [W]: of its largest quarter of an hour in shifts, common_demand that of the common
+    program, 0 where no file says it; idle [W]: at rest by power mode; month: of its
     start, as "2026-05" (UTC); driven, predicted [J]: of its run, as it was driven; rest_saves
     [W]: what hibernation saves over closed brakes; rest_measured: whether powers at rest were.
     """
@@ -209,6 +213,7 @@ class Member:
     predicted: float
     rest_saves: Amount | None = None
     rest_measured: bool = False
+    common_demand: float = 0.0
 
 
 def read_members(
@@ -267,6 +272,7 @@ def member_of(analysis: Analysis, robot: str, said: Said = lambda _: None) -> Me
         *driven_and_predicted(analysis),
         rest_saving(analysis),
         rest_measured(analysis),
+        0.0 if cycle.savings is None else cycle.savings.common_demand,
     )
 
 
@@ -650,15 +656,16 @@ def _tiles(
         yearly_money(price.value, costs.currency),
         (between_of(price, costs), energy, of),
     )
-    peak = sum(_demand(members, robot) for robot in summed)
+    of_all = _sum_of_demands([_demand(members, robot, costs) for robot in summed])
     demand = Tile(
         "largest quarter of an hour",
-        watts(peak),
+        watts(of_all.watts),
         (
-            "in shifts, as if all robots' largest came at once",
-            UNDRIVEN if any(_stands(robot) for robot in summed) else "",
+            f"{of}: {of_all.words}",
+            "as if all robots' largest came at once" if len(summed) > 1 else "",
+            _unsaid(members, summed),
             _outside(paid.idle),
-            demand_note(peak, costs),
+            demand_note(of_all.watts, costs),
         ),
     )
     return [costs_tile, demand]
@@ -695,8 +702,36 @@ def _stands(robot: Robot) -> bool:
     return not robot.driven and robot.common is not None
 
 
-def _demand(members: Sequence[Member], robot: Robot) -> float:
-    return max(member.demand for member in members if member.robot == robot.name)
+def _demand(members: Sequence[Member], robot: Robot, costs: Costs) -> Demand:
+    """The largest quarter of an hour as the robot is today, on the basis of its bill."""
+    own = _own(members, robot)
+    stands = _stands(robot)
+    shifts = max((stands and member.common_demand) or member.demand for member in own)
+    rests: dict[str, float] = {}
+    for member in own:
+        rests |= {mode: max(power, rests.get(mode, 0.0)) for mode, power in member.idle.items()}
+    return demand_of(shifts, rests, costs, planned=not robot.driven and not stands)
+
+
+def _sum_of_demands(demands: Sequence[Demand]) -> Demand:
+    total = demands[0]
+    for each in demands[1:]:
+        total = total.plus(each)
+    return total
+
+
+def _unsaid(members: Sequence[Member], robots: Sequence[Robot]) -> str:
+    """Whose largest quarter is that of the plan, as its file is of an earlier version."""
+    without = [
+        robot
+        for robot in robots
+        if _stands(robot) and not all(each.common_demand for each in _own(members, robot))
+    ]
+    return f"{UNSAID}: {_names(without)}" if without else ""
+
+
+UNSAID = "as planned, as no file says the common program's"
+"""Of the largest quarter of an hour of plans that an earlier version wrote."""
 
 
 def _paid(members: Sequence[Member], costs: Costs) -> Paid:
@@ -868,11 +903,11 @@ def _around_the_clock(members: Sequence[Member], robots: Sequence[Robot], costs:
     """The largest quarter of an hour, and what rest outside of the shifts takes, by robot."""
     modes = list(dict.fromkeys(mode for member in members for mode in member.idle))
     rows = []
-    demands = []
+    demands: list[Demand] = []
     idle: dict[str, list[float]] = {mode: [] for mode in modes}
     for robot in robots:
         own = [member for member in members if member.robot == robot.name]
-        demand = _demand(members, robot)
+        demand = _demand(members, robot, costs)
         if not robot.drives_only:
             demands.append(demand)
         energies = []
@@ -885,12 +920,13 @@ def _around_the_clock(members: Sequence[Member], robots: Sequence[Robot], costs:
         rows.append(_clock_row(_named(robot), demand, energies, costs))
     sums = [sum(idle[mode]) for mode in modes]
     if demands:
-        rows.append(_clock_row("<b>all</b>", sum(demands), sums, costs))
+        rows.append(_clock_row("<b>all</b>", _sum_of_demands(demands), sums, costs))
     heads = ("robot", ">largest quarter of an hour", *(f">{_rest_head(mode)}" for mode in modes))
     hint = (
         f"{significant(costs.idle_hours, 6)} hours a year lie outside of the shifts; the columns "
         "of modes say what rest takes in them, by the data. The peak of all robots is the sum of "
-        f"theirs: as if all came at once. {idle_sentence(_idle_saving(members, costs), costs)}"
+        f"theirs: as if all came at once; it is on the basis of the bill ({_as_now(robots)}). "
+        f"{DEMAND_LEAVES_OUT} {idle_sentence(_idle_saving(members, costs), costs)}"
     )
     return f'<p class="hint">{text(hint)}</p>{table(heads, rows, "Peak and rest")}'
 
@@ -959,17 +995,15 @@ def _shortened(member: Member) -> bool:
 
 
 def _clock_row(
-    name: str, demand: float, energies: Sequence[float], costs: Costs
+    name: str, demand: Demand, energies: Sequence[float], costs: Costs
 ) -> tuple[str, ...]:
-    price = demand / 1000.0 * costs.demand_price
-    small = (
-        f"<small>{text(yearly_money(price, costs.currency))} a year</small>" if price > 0.0 else ""
-    )
+    lines = (demand.words, demand_note(demand.watts, costs))
+    small = "".join(f"<small>{text(line)}</small>" for line in lines if line)
     cells = (
         f"{text(idle_money(energy, costs))}<small>{text(kilowatt_hours(energy))}</small>"
         for energy in energies
     )
-    return (name, f"<b>{watts(demand)}</b>{small}", *cells)
+    return (name, f"<b>{watts(demand.watts)}</b>{small}", *cells)
 
 
 def _shown(name: str) -> str:

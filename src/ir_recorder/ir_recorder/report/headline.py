@@ -14,7 +14,6 @@ from ir_recorder.analysis.production import (
     PREDICTED,
     Amount,
     Production,
-    demand_watts,
     deviation,
     driven_and_predicted,
     drives_only,
@@ -37,6 +36,7 @@ from ir_recorder.report.costs import (
     driven_name,
     money_of_thousand,
     origin_of,
+    recorded_demand,
     recorded_idle_saving,
 )
 from ir_recorder.report.methods import counted
@@ -200,11 +200,11 @@ def tiles(analysis: Analysis, costs: Costs | None = None) -> str:
 
 
 def _demand(analysis: Analysis, cycle: Production, costs: Costs) -> Tile:
-    peak = demand_watts(analysis, cycle)
+    found = recorded_demand(analysis, cycle, costs)
     return Tile(
         "largest quarter of an hour",
-        watts(peak),
-        (demand_note(peak, costs), origin_of(cycle), cycle.supply),
+        watts(found.watts),
+        (found.words, demand_note(found.watts, costs), origin_of(cycle), cycle.supply),
     )
 
 

@@ -12,6 +12,7 @@ from ir_recorder.report.answer import Answer
 from ir_recorder.report.bars import Piece, Row, bars
 from ir_recorder.report.costs import (
     COMMON,
+    ON_BRAKES,
     PLANNED,
     TODAY,
     Costs,
@@ -276,8 +277,6 @@ def planned_name(before: str) -> str:
     return f"{PLANNED}s" if before.endswith("programs") else PLANNED
 
 
-ON_BRAKES = "on closed brakes"
-"""How a robot rests outside of the shifts where nobody puts it into another mode."""
 KEEP = "Keep the program as it is."
 
 

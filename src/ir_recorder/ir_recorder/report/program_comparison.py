@@ -11,14 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from ir_description import Cell
-from ir_msgs_py.savings import BeforeAfter, Side, StepChange, one_sided
+from ir_msgs_py.savings import BeforeAfter, Side, StepChange, largest_quarter, one_sided
 from ir_recorder.analysis.production import (
     DRIVES_ONLY,
     OPEN,
     Amount,
     all_rests_measured,
     home_watts,
-    largest_quarter,
     saved_amount,
     saved_at_rest,
 )
@@ -30,11 +29,13 @@ from ir_recorder.report.costs import (
     PLANNED,
     TODAY,
     Costs,
+    Demand,
     IdleSaving,
     assumed_section,
     counted_with,
     cycles_of_year,
     demand_note,
+    demand_of,
     following_price,
     how_to_hibernate,
     idle_saving,
@@ -145,7 +146,7 @@ def tiles(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     today = found.today.report
     saving = side.saving
     word, cycle = saved_amount(saving).gain()
-    quarter = demand_of(side)
+    quarter, quarter_before = (_demand_of(found, each, cell, costs) for each in (side, found.today))
     before = program_before(found)
     return row_of(
         [
@@ -165,8 +166,12 @@ def tiles(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
             ),
             Tile(
                 "largest quarter of an hour",
-                watts(quarter),
-                (f"{before} {watts(demand_of(found.today))}", demand_note(quarter, costs)),
+                watts(quarter.watts),
+                (
+                    quarter.words,
+                    f"{before} {watts(quarter_before.watts)}: {quarter_before.words}",
+                    demand_note(quarter.watts, costs),
+                ),
             ),
             Tile(
                 "peak power",
@@ -201,7 +206,7 @@ def _standing(side: Side) -> float:
     return sum(hop.seconds for hop in side.hops if hop.is_pause)
 
 
-def figure_table(found: BeforeAfter, costs: Costs) -> str:
+def figure_table(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     """Every figure, a column for each program."""
     sides = [found.today, *(side for side in found.sides if not _alike(found, side))]
     years = [year_of(found, side, costs) if side.found else None for side in sides]
@@ -232,7 +237,10 @@ def figure_table(found: BeforeAfter, costs: Costs) -> str:
             *(_cost(year.saved if year and k else None, costs) for k, year in enumerate(years)),
         ),
         ("CO2 a year, in shifts", *(_co2(year, costs) for year in years)),
-        ("largest quarter of an hour", *(_demand(side, costs) for side in sides)),
+        (
+            "largest quarter of an hour",
+            *(_demand(found, side, cell, costs) for side in sides),
+        ),
         (
             "peak power",
             *(
@@ -269,20 +277,34 @@ def _alike(found: BeforeAfter, side: Side) -> bool:
 _NEAR = 0.01  # of energy and time: programs that differ by less are one column
 
 
-def demand_of(side: Side) -> float:
+def quarter_of(side: Side) -> float:
     """The largest mean power [W] of a quarter of an hour of cycles of a side, one directly after
     the other, each movement and pause at its mean power.
     """
-    hops = side.hops
-    seconds_of = np.array([hop.seconds for hop in hops])
-    return largest_quarter(seconds_of, np.array([hop.energy for hop in hops]))
+    steps = side.movements
+    seconds_of = np.array([step.duration for step in steps])
+    return largest_quarter(seconds_of, np.array([step.report.energy for step in steps]))
 
 
-def _demand(side: Side, costs: Costs) -> str:
+def _demand_of(found: BeforeAfter, side: Side, cell: Cell, costs: Costs) -> Demand:
+    """That of all hours: what runs today rests on closed brakes at night, as in its year."""
+    rests = _rests(found, cell)
+    return demand_of(quarter_of(side), rests, costs, planned=side is not found.today)
+
+
+def _demand(found: BeforeAfter, side: Side, cell: Cell, costs: Costs) -> str:
     if not side.found:
         return DASH
-    power = demand_of(side)
-    return _cell(watts(power), demand_note(power, costs))
+    demand = _demand_of(found, side, cell, costs)
+    return _cell(watts(demand.watts), demand.words, demand_note(demand.watts, costs))
+
+
+def _rests(found: BeforeAfter, cell: Cell) -> dict[str, float]:
+    """W at rest outside of the shifts, by power mode; empty where it isn't known."""
+    controller = cell.robot.controller
+    if not controller.counted:
+        return {}
+    return home_watts(cell, found.planned.movements[-1].load, controller)
 
 
 def _idle(found: BeforeAfter, cell: Cell, costs: Costs) -> IdleSaving | None:
@@ -291,9 +313,8 @@ def _idle(found: BeforeAfter, cell: Cell, costs: Costs) -> IdleSaving | None:
     if not controller.counted:
         return None
     load = found.planned.movements[-1].load
-    rests = home_watts(cell, load, controller)
     saves = saved_at_rest(cell, load, controller)
-    return idle_saving(rests, saves, costs, measured=all_rests_measured(controller))
+    return idle_saving(_rests(found, cell), saves, costs, measured=all_rests_measured(controller))
 
 
 def change_table(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
@@ -577,7 +598,7 @@ def before_after_html(found: BeforeAfter, cell: Cell, costs: Costs | None = None
         "how": text(how_to_hibernate(cell)),
         "paid": paid_row(found, cell, prices),
         "tiles": tiles(found, cell, prices),
-        "figures": figure_table(found, prices),
+        "figures": figure_table(found, cell, prices),
         "assumptions": assumptions(prices),
         "basis": basis_section(found, cell),
         "line": _line(found, cell, prices),

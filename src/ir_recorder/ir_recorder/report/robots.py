@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ir_msgs_py.savings import largest_quarter
 from ir_recorder.analysis import Analysis, Finding
 from ir_recorder.analysis.production import (
     Production,
     deviation,
     idle_watts,
-    largest_quarter,
     production_of,
     rest_measured,
     rest_saving,
@@ -32,6 +32,7 @@ from ir_recorder.report.costs import (
     counted_with,
     cycles_of_year,
     demand_note,
+    demand_of,
     following_price,
     idle_saving,
     money_of_thousand,
@@ -186,13 +187,11 @@ def _to_do(analyses: Mapping[str, Analysis], cycle: Production, costs: Costs) ->
 def _idle_of_all(analyses: Mapping[str, Analysis], costs: Costs) -> IdleSaving | None:
     """What hibernation of all saves outside of the shifts; None where it is not known of one."""
     every = list(analyses.values())
-    rests = [idle_watts(analysis) for analysis in every]
     saves = [saved for analysis in every if (saved := rest_saving(analysis)) is not None]
     if len(saves) < len(every):
         return None
-    watts_of_all = {mode: sum(rest[mode] for rest in rests) for mode in rests[0]}
     measured = all(map(rest_measured, every))
-    return idle_saving(watts_of_all, sum_of(saves), costs, measured=measured)
+    return idle_saving(_rests_of_all(analyses), sum_of(saves), costs, measured=measured)
 
 
 _LONG_WAIT = 0.05  # of a cycle: less is no work worth moving
@@ -221,9 +220,17 @@ def _tiles(analyses: Mapping[str, Analysis], cycle: Production | None, costs: Co
 
 def _demand(analyses: Mapping[str, Analysis], costs: Costs) -> Tile:
     """The largest quarter of an hour of all together, and its price where one is given."""
-    power = common_demand(analyses)
-    words = "mean power of all robots, cycle after cycle"
-    return Tile("largest quarter of an hour", watts(power), (demand_note(power, costs), words))
+    rests = _rests_of_all(analyses)
+    found = demand_of(common_demand(analyses), rests, costs, planned=False)
+    said = (found.words, "mean power of all robots", demand_note(found.watts, costs))
+    return Tile("largest quarter of an hour", watts(found.watts), said)
+
+
+def _rests_of_all(analyses: Mapping[str, Analysis]) -> dict[str, float]:
+    """W at rest of all robots together, by power mode that each of them knows."""
+    rests = [idle_watts(analysis) for analysis in analyses.values()]
+    known = set.intersection(*map(set, rests)) if rests else set()
+    return {mode: sum(rest[mode] for rest in rests) for mode in rests[0] if mode in known}
 
 
 def _table(analyses: Mapping[str, Analysis], cycle: Production | None, costs: Costs) -> str:
