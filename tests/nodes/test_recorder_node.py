@@ -389,6 +389,40 @@ def test_a_recording_that_lost_its_file_says_so_and_goes_on_in_another(
     assert stop(call).status.code == StatusCode.SUCCESS
 
 
+def test_a_file_in_the_way_of_the_next_is_warned_of_and_the_present_one_goes_on(
+    recorder: RecorderNode,
+    ros_node: Any,
+    ros_executor: Any,
+    call: Any,
+    wait_for: Any,
+    tmp_path: Path,
+) -> None:
+    heard: list[DiagnosticStatus] = []
+
+    def hear(message: DiagnosticArray) -> None:
+        heard.extend(each for each in message.status if "goes on" in each.message)
+
+    ros_executor.run(
+        lambda: ros_node.create_subscription(DiagnosticArray, "/diagnostics", hear, 10)
+    )
+    publisher = ros_node.create_publisher(String, "/robot_description", LATCHED)
+    start(call, tmp_path / "shift.mcap", split_duration=1.0)
+    (tmp_path / "shift_1.mcap").write_text("another's")
+
+    def warned() -> bool:
+        publisher.publish(String(data="<robot/>"))
+        return bool(heard)
+
+    wait_for(warned, what="the warning")
+    assert heard[0].level == DiagnosticStatus.WARN
+    answer = stop(call)
+    assert answer.status.code == StatusCode.SUCCESS
+    assert "not split: " in answer.status.message
+    assert "shift_1.mcap is there already" in answer.status.message
+    assert answer.paths == [str(tmp_path / "shift.mcap")]
+    assert (tmp_path / "shift_1.mcap").read_text() == "another's"
+
+
 def test_the_planners_cell_is_attached(
     recorder: RecorderNode, ros_node: Any, call: Any, wait_for: Any, tmp_path: Path
 ) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from ir_recorder.errors import RecorderError
+from ir_recorder.errors import RecorderError, WriteError
 from ir_recorder.format.contents import Split, is_further_part, part_path
 from ir_recorder.format.qos import QosOffer
 from ir_recorder.reading.mcap_file import RawRecording, read_raw
@@ -47,6 +47,46 @@ def recorded(path: Path, split: Split, seed: int) -> RecordingSummary:
 
 def messages_of(raw: RawRecording) -> dict[str, list[tuple[int, bytes]]]:
     return {c.topic: list(zip(c.log_time.tolist(), c.messages, strict=True)) for c in raw.channels}
+
+
+@pytest.mark.parametrize("leaves", [0, 6_000_000_000])
+def test_a_file_in_the_way_of_the_next_loses_nothing(leaves: int, tmp_path: Path) -> None:
+    """The present file goes on meanwhile, and says so; leaves: when [ns] the other one goes."""
+    split = Split(duration=1.5)
+    other = tmp_path / "mine_2.mcap"
+    other.write_bytes(b"somebody's")
+    session = RecordingSession(RecordingWriter(tmp_path / "mine.mcap"), {}, 0, split)
+    session.open_topic("/joint_states", *TOPICS["/joint_states"])
+    sent = [(k * 4_000_000, bytes([k % 256]) * 40) for k in range(2500)]
+    said = set()
+    for time, data in sent:
+        if time == leaves > 0:
+            assert other.read_bytes() == b"somebody's"
+            other.unlink()
+        session.message("/joint_states", data, time)
+        said.add(session.blocked)
+    summary = session.finish()
+    assert said == {"", f"{other} is there already; choose another path or set overwrite; "
+                    "mine_1.mcap goes on"}  # fmt: skip
+    assert bool(summary.blocked) == (leaves == 0)
+    assert len(summary.paths) == (5 if leaves else 2)
+    assert messages_of(read_raw(summary.path))["/joint_states"] == sent
+
+
+def test_a_disk_that_refuses_the_end_of_a_file_leaves_no_empty_next_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(self: RecordingWriter) -> RecordingSummary:
+        raise WriteError("no space left on device")
+
+    session = RecordingSession(RecordingWriter(tmp_path / "a.mcap"), {}, 0, Split(duration=1.0))
+    session.open_topic("/joint_states", *TOPICS["/joint_states"])
+    session.message("/joint_states", b"\0" * 40, 0)
+    session.flush()
+    monkeypatch.setattr(RecordingWriter, "finish", full)
+    with pytest.raises(WriteError, match="no space"):
+        session.message("/joint_states", b"\0" * 40, 2_000_000_000)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]
 
 
 @pytest.mark.parametrize(

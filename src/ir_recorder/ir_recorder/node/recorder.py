@@ -104,6 +104,8 @@ class RecorderServices:
                 held += f", {summary.dropped} dropped: the disk was too slow"
             if summary.lost:
                 held += f", {summary.lost} lost: they never arrived, as where a node was suspended"
+            if summary.blocked:
+                held += f"; not split: {summary.blocked}"
             held += without_publisher(unmet, "was seen")
             if lost:
                 raise LostFileError(f"{lost}: {held}")
@@ -132,12 +134,13 @@ def without_publisher(topics: Sequence[str], when: str) -> str:
 @dataclass(frozen=True)
 class State:
     """failure: why the last recording ended on its own; path: of the running one, "" for none;
-    lost: messages that never arrived; dropped: for which the disk was too slow; waiting: bytes in
-    the queue to it.
+    blocked: why its next file can't be begun, "" where it can; lost: messages that never arrived;
+    dropped: for which the disk was too slow; waiting: bytes in the queue to it.
     """
 
     failure: str
     path: str
+    blocked: str
     messages: int
     topics: int
     lost: int
@@ -154,8 +157,9 @@ class RecorderDiagnostics:
 
     def publish(self, state: State) -> None:
         """One status."""
-        level = ERROR if state.failure else WARN if state.lost or state.dropped else OK
-        sentence = state.failure or ("recording" if state.path else "idle")
+        doubtful = state.lost or state.dropped or state.blocked
+        level = ERROR if state.failure else WARN if doubtful else OK
+        sentence = state.failure or state.blocked or ("recording" if state.path else "idle")
         values = {name: value for name, value in asdict(state).items() if name != "failure"}
         self._diagnostics.publish([Condition(self._name, level, sentence, values)])
 
@@ -211,6 +215,7 @@ class RecorderNode(Node):
         self._listener = TopicListener(self, self._settings.depth)
         self._passed_over: set[str] = set()
         self._failure = ""
+        self._blocked = ""
         self._cell = CellRequest(self, self._attach)
         self._parameter_requests = ParameterRequests(
             self,
@@ -388,10 +393,15 @@ class RecorderNode(Node):
     def _each_second(self) -> None:
         self._ask()
         recording = self._recording
+        blocked = recording.session.blocked if recording is not None else ""
+        if blocked != self._blocked and blocked:
+            self.get_logger().warning(blocked)
+        self._blocked = blocked
         self._diagnostics.publish(
             State(
                 self._failure,
                 recording.session.path if recording is not None else "",
+                blocked,
                 self.messages,
                 len(self._listener),
                 self._listener.lost,

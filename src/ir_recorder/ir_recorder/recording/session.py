@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from ir_recorder.errors import LostFileError
+from ir_recorder.errors import LostFileError, RecorderError, WriteError
 from ir_recorder.format import contents
 from ir_recorder.format.contents import Split, part_facts, part_path
 from ir_recorder.format.qos import QosOffer
@@ -29,11 +29,14 @@ PACKAGES = (
     *("ir_msgs", "numpy", "scipy", "pybullet", "rclpy"),
 )
 
+_TRIED_AGAIN = 1_000_000_000  # ns until a next file that can't be begun is tried again
+
 
 class RecordingSession:
     """Feeds a writer, and the next one where `split` says so (`open_next` opens it).
 
-    Every method may raise WriteError, after which the session is over.
+    Every method may raise WriteError, after which the session is over. blocked: why the next file
+    can't be begun, so that this one goes on and it is tried again each second; "" where it can.
     """
 
     def __init__(
@@ -50,6 +53,8 @@ class RecordingSession:
         self._latched = LatchedMessages()
         self._first = writer.path
         self._part = 0
+        self.blocked = ""
+        self._next_try = 0
         self._begun = time
         self._name = f"{writer.path.stem} {time}"
         self._topics: dict[str, tuple[str, Sequence[QosOffer]]] = {}
@@ -94,7 +99,8 @@ class RecordingSession:
 
     def message(self, topic: str, data: bytes, time: int) -> None:
         """Appends a message of an open topic, received at `time` [ns]."""
-        if self._split.wanted and self._split.due(self._writer.size, (time - self._begun) * 1e-9):
+        due = self._split.due(self._writer.size, (time - self._begun) * 1e-9)
+        if due and not (self.blocked and time < self._next_try):
             self._next_file(time)
         self._writer.write(self._channels[topic], time, data)
         self._latched.keep(topic, data)
@@ -135,7 +141,8 @@ class RecordingSession:
         if lost:
             raise LostFileError(f"{self._first}: {', '.join(lost)} of it is gone")
         first, last = self._span
-        return RecordingSummary(self._first, self._messages, (last - first) * 1e-9, paths)
+        seconds = (last - first) * 1e-9
+        return RecordingSummary(self._first, self._messages, seconds, paths, blocked=self.blocked)
 
     def _head(self) -> None:
         """What every file begins with."""
@@ -145,11 +152,22 @@ class RecordingSession:
             self._writer.facts(contents.PARTS, record)
 
     def _next_file(self, time: int) -> None:
-        """Ends the file and begins another that can be read alone."""
-        self._writer.finish()
+        """Ends the file and begins another that can be read alone, where one can be opened."""
+        try:
+            following = self._open_next(part_path(self._first, self._part + 1))
+        except RecorderError as error:
+            self.blocked = f"{error}; {self._writer.path.name} goes on"
+            self._next_try = time + _TRIED_AGAIN
+            return
+        try:
+            self._writer.finish()
+        except WriteError:
+            following.discard()
+            raise
+        self.blocked = ""
         self._part = self._part + 1
         self._begun = time
-        self._writer = self._open_next(part_path(self._first, self._part))
+        self._writer = following
         self._head()
         for name, (media, data) in self._attached.items():
             self._writer.attach(name, media, data, time)

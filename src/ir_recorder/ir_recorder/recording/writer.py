@@ -40,8 +40,8 @@ _NAME_MAX = 200  # bytes of a file's name; file systems end at 255
 @dataclass(frozen=True)
 class RecordingSummary:
     """What a finished recording holds: its file (the first, where `paths` has several), the number
-    of messages, the time they span [s], how many messages the disk was too slow for, and how many
-    never arrived.
+    of messages, the time they span [s], how many messages the disk was too slow for, how many never
+    arrived, and why the last file was not split further ("": it was not due).
     """
 
     path: Path
@@ -50,6 +50,7 @@ class RecordingSummary:
     paths: tuple[Path, ...] = ()
     dropped: int = 0
     lost: int = 0
+    blocked: str = ""
 
 
 class RecordingWriter:
@@ -169,6 +170,10 @@ class RecordingWriter:
             self._finished = True
         first = self._last if self._first is None else self._first
         return RecordingSummary(self.path, self._messages, (self._last - first) * 1e-9)
+
+    def discard(self) -> None:
+        """Close a file that nothing was written into; it is deleted."""
+        self._file.close()
 
     def _check_there(self) -> None:
         """OSError for a file that was deleted or replaced: it takes whatever is written, and
