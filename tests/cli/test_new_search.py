@@ -80,6 +80,21 @@ def test_it_plans_by_its_name_and_says_whose_it_is(site: Path) -> None:
 
 
 @pytest.mark.long
+def test_it_keeps_the_tool_upright(site: Path) -> None:
+    words = (
+        "-m",
+        "ir_cli.main",
+        "ask",
+        "move",
+        "demo",
+        "home",
+        "A1 30 A2 -90 A3 90 A4 0 A5 0 A6 0",
+    )
+    answer = run(site, *words, "--tilt-max", "5", "--planner", NAME)
+    assert answer.returncode == 0, answer.stderr
+
+
+@pytest.mark.long
 def test_no_default_asks_it(site: Path) -> None:
     words = ("-m", "ir_cli.main", "ask", "move", "demo", "home", "park", "--json")
     with_it = json.loads(run(site, *words).stdout)
@@ -91,7 +106,7 @@ def test_it_passes_the_contract(site: Path) -> None:
     words = ("-m", "pytest", "-q", "-p", "no:cacheprovider", "--pyargs", "ir_planner.contract")
     answer = run(site, *words, "-k", NAME)
     assert answer.returncode == 0, answer.stdout
-    assert "10 passed" in answer.stdout
+    assert "11 passed" in answer.stdout
 
 
 @pytest.mark.long

@@ -39,6 +39,7 @@ MODULE = '''\
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -53,6 +54,7 @@ from ir_values.settings import check_settings, setting
 class {type}:
     """Paths over one via configuration, drawn within the limits of the joints."""
 
+    keeps_upright: ClassVar[bool] = True  # as `_free` does; without it tilt_max is refused
     vias: int = setting(200, "Via configurations drawn at once.", minimum=1, maximum=10_000)
 
     def __post_init__(self) -> None:
@@ -72,7 +74,10 @@ class {type}:
         return Found(free, "" if free else f"no via of {{self.vias}} at once leads there")
 
     def _free(self, paths: list[np.ndarray], space: FreeSpace) -> list[np.ndarray]:
-        """Those whose every step is certified, which is charged to the work."""
+        """Those whose every step is certified, which is charged to the work. With a tilt_max they
+        get points on which the tool is upright.
+        """
+        paths = space.kept_upright(paths)
         proved = space.paths_free(paths)
         return [path for path, is_free in zip(paths, proved, strict=True) if is_free]
 '''

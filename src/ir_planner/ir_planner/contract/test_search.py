@@ -15,8 +15,8 @@ from ir_kernels.collision import FREE
 from ir_planner import CancelledError, Goal, Planner, PlannerSettings, PlanOptions, RequestError
 from ir_planner.checks import FreeSpace
 from ir_planner.request import Work
-from ir_planner.scene import PlanningScene, path_cost
-from ir_planner.search import SEARCHES, Ends, Found, Search, repeatable
+from ir_planner.scene import TILT_TOLERANCE, PlanningScene, ToolCone, path_cost
+from ir_planner.search import SEARCHES, Ends, Found, Search, keeps_upright, repeatable
 from ir_values.settings import describe
 
 SEED = 7
@@ -35,6 +35,11 @@ TASKS = (
     ("cnc_door", "cnc->pal"),
     ("deep_box", "tun->bin"),
 )
+# Tasks for a tool that must stay upright: the straight movement is free in the first, whose goal
+# leans by 15 deg, and blocked in the others. Again, at least one must be solved.
+UPRIGHT_TASKS = (("open", "home->p1"), ("open", "p1->p2"), ("table_columns", "tL->tR"))
+LARGEST_TILT = np.radians(20.0)
+UP = np.array([0.0, 0.0, 1.0])
 WALLED_IN = """
 format: ir_cell/1
 name: walled_in
@@ -73,15 +78,24 @@ def asked(scene: PlanningScene, task: str) -> Ends:
     return Ends(np.array(chosen.start), np.array([chosen.goal]))
 
 
+def enough_work(search: Search) -> Work:
+    """In which a search of this kind solves a task or two within seconds."""
+    interpreted = any(search is SEARCHES[name] for name in INTERPRETED)
+    return unhurried(LITTLE_WORK if interpreted else WORK)
+
+
+def upright_cone(scene: PlanningScene, start: np.ndarray) -> ToolCone:
+    """In which the axis of the tool stays that points up at the start (n,)."""
+    rotation = scene.chain.tcp_poses(start[None])[0, :3, :3]
+    return ToolCone(scene.chain, rotation.T @ UP, UP, LARGEST_TILT)
+
+
 def answers_again(search: Search, seed: int = SEED) -> list[Answer]:
     """The same, searched for once more."""
-    interpreted = any(search is SEARCHES[name] for name in INTERPRETED)
     found = []
     for cell, task in TASKS:
         scene = scene_of(cell)
-        space = FreeSpace.of(
-            scene, SAFETY_DISTANCE, unhurried(LITTLE_WORK if interpreted else WORK)
-        )
+        space = FreeSpace.of(scene, SAFETY_DISTANCE, enough_work(search))
         ends = asked(scene, task)
         paths = search.find(ends, space, seed, space.work)
         found.append((paths, space, ends, space.work.iterations))
@@ -134,6 +148,32 @@ def test_the_same_seed_gives_the_same_bytes(name: str) -> None:
         assert [path.tobytes() for path in one.paths] == [path.tobytes() for path in other.paths]
         assert one.note == other.note
         assert spent == again
+
+
+def paths_keep_the_tool_upright(search: Search) -> None:
+    """Fails where a path leaves the cone of its space, or none is found."""
+    solved = 0
+    for cell, task in UPRIGHT_TASKS:
+        scene = scene_of(cell)
+        ends = asked(scene, task)
+        cone = upright_cone(scene, ends.start)
+        space = FreeSpace.of(scene, SAFETY_DISTANCE, enough_work(search), cone=cone)
+        for path in search.find(ends, space, SEED, space.work).paths:
+            solved += 1
+            largest = float(cone.tilts(sampled(path)).max())
+            assert largest <= LARGEST_TILT + TILT_TOLERANCE, "the tool leans too far"
+            assert cone.edges_held(path[:-1].copy(), path[1:].copy()).all()
+    assert solved > 0
+
+
+@pytest.mark.parametrize("name", [name for name in SEARCHES if keeps_upright(SEARCHES[name])])
+def test_a_search_that_says_so_keeps_the_tool_in_the_cone(name: str) -> None:
+    paths_keep_the_tool_upright(SEARCHES[name])
+
+
+def test_the_contract_notices_a_search_that_lets_the_tool_lean() -> None:
+    with pytest.raises(AssertionError, match="leans too far"):
+        paths_keep_the_tool_upright(SEARCHES["genetic"])
 
 
 def test_work_is_charged(search: Search) -> None:

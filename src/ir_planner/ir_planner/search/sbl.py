@@ -11,6 +11,7 @@ coordinate.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -132,6 +133,7 @@ _CERTIFIED = 64  # level of an edge that is proved: beyond all that pieces are c
 class Sbl:
     """Two trees of milestones whose edges are tested only when they join both (SBL)."""
 
+    keeps_upright: ClassVar[bool] = True
     near: float = setting(
         0.15,
         "Size of the cube in which milestones are sampled, and joined; share of the joint range.",
