@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -9,13 +10,14 @@ import pinocchio
 import pytest
 
 from ir_description import cell_to_yaml, load_cell, robot_urdf
-from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.options import NO_TILT, PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner, RequestError
-from ir_planner.regional import MovementPlan
-from ir_planner.request import cone_of, upright_options
-from ir_planner.search import SEARCHES, keeps_upright
+from ir_planner.checks import FreeSpace
+from ir_planner.regional import MovementPlan, search_regional
+from ir_planner.request import Context, Journal, Work, cone_of, upright_options
+from ir_planner.search import SEARCHES, Ends, Found, keeps_upright
 from ir_values.arrays import FloatArray
 
 CELLS = ("table_columns", "kr6_bench", "ur10e_bench")  # a KR 210, a KR 6, a UR10e
@@ -204,6 +206,28 @@ def test_ends_outside_are_refused_with_value_bound_and_unit() -> None:
     ):
         with pytest.raises(RequestError, match=said):
             planner.plan_regional(start=upright, goal=leaning, **wrong)
+
+
+@dataclasses.dataclass(frozen=True)
+class Unaware:
+    """Finds nothing, heeds no cone, and writes down that it was asked."""
+
+    asked: list[int] = dataclasses.field(default_factory=list)
+
+    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+        self.asked.append(seed)
+        return Found([])
+
+
+@pytest.mark.parametrize(("most", "asked"), [(NO_TILT, True), (NARROW, False)])
+def test_the_portfolio_asks_no_search_that_lets_the_tool_lean(most: float, asked: bool) -> None:
+    scene = planner_in("open").scene()
+    task = scene.cell.task("conv->p1")
+    unaware = {name: Unaware() for name in ("direct", "detours")}
+    options = PlanOptions(tilt_max=most, max_iterations=200)
+    context = Context(scene, options, Journal(Work(200, 1.0, lambda: 0.0), 0))
+    search_regional(np.array(task.start), np.array(task.goal), context, {**SEARCHES, **unaware})
+    assert [bool(search.asked) for search in unaware.values()] == [asked, asked]
 
 
 def test_a_tilt_between_the_points_of_a_trajectory_is_found() -> None:

@@ -51,7 +51,7 @@ def first_paths(
     searches with little work, of the default portfolio only.
     """
     journal = context.journal
-    for name, search in _attempts(context.options.planner_id, searches, briefly):
+    for name, search in _attempts(context, searches, briefly):
         with journal.stage(name) as notes:
             notes.extend(filter(None, [SEARCHES.origin(name)]))
             found = search.find(ends, space, context.options.seed, space.work)
@@ -71,12 +71,21 @@ def first_paths(
     return []
 
 
-def _attempts(planner_id: str, searches: Searches, briefly: bool) -> Iterator[tuple[str, Search]]:
+def heeds_the_tilt(search: Search, context: Context) -> bool:
+    """Whether the paths of a search keep the tilt that is asked for; true where none is."""
+    return context.cone is None or keeps_upright(search)
+
+
+def _attempts(context: Context, searches: Searches, briefly: bool) -> Iterator[tuple[str, Search]]:
+    """The searches for a first path with their names, in turn."""
+    planner_id = context.options.planner_id
     if planner_id:
         if not briefly:
             yield planner_id, searches[planner_id]
         return
     for name in FIRST_SEARCHES:
+        if not heeds_the_tilt(searches[name], context):
+            continue
         if briefly:
             yield name, quick(searches[name])
         elif quick(searches[name]) != searches[name]:
@@ -106,8 +115,7 @@ def improve(
     explorers = [
         name
         for name in EXPLORERS
-        if context.options.planner_id in ("", name)
-        and (context.cone is None or keeps_upright(searches[name]))
+        if context.options.planner_id in ("", name) and heeds_the_tilt(searches[name], context)
     ]
     turn = 0
     with journal.stage("improve") as notes:

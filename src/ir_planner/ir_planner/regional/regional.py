@@ -29,7 +29,7 @@ from ir_planner.configurations import free_configurations, no_configuration
 from ir_planner.errors import RequestError
 from ir_planner.optimize import Portfolio, Refinement
 from ir_planner.presentation import in_mm, plot_trajectory, result_text
-from ir_planner.regional.exploration import Path, Searches, first_paths
+from ir_planner.regional.exploration import Path, Searches, first_paths, heeds_the_tilt
 from ir_planner.regional.in_motion import search_in_motion
 from ir_planner.regional.no_path import barrier, enclosure
 from ir_planner.regional.safeguards import (
@@ -181,7 +181,7 @@ def search_regional(
 def _check_search(context: Context, searches: Searches) -> None:
     """Raise RequestError for a search that is asked for by name and heeds no bound of the tilt."""
     name = context.options.planner_id
-    if context.cone is None or not name or keeps_upright(searches[name]):
+    if not name or heeds_the_tilt(searches[name], context):
         return
     able = ", ".join(name for name, search in searches.items() if keeps_upright(search))
     raise RequestError(
