@@ -79,7 +79,7 @@ def searched(
     _ = question.scene.weights
     space.states_free(question.start[None])
     begin = time.process_time()
-    found = search.find(Ends(question.start, question.goal[None]), space, seed, space.work)
+    found = search.find(Ends(question.start, question.goal[None]), space, seed)
     seconds = time.process_time() - begin
     path = found.paths[0] if found.paths else None
     return Found(path is not None, space.work.iterations, seconds, _cost(path, question))

@@ -17,7 +17,6 @@ from sensor_msgs.msg import JointState
 from ir_msgs.msg import PlanOptions, Status
 from ir_msgs.srv import PlanRegionalMovement
 from ir_planner.checks import FreeSpace
-from ir_planner.request import Work
 from ir_planner.search import SEARCHES, Ends, Found
 from ir_planner.settings import PlannerSettings
 from ir_values.settings import setting, settings_table
@@ -33,7 +32,7 @@ class OverTheTop:
         0.3, "How far joint 2 lifts the arm.", unit="rad", minimum=0.0, maximum=1.0
     )
 
-    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+    def find(self, ends: Ends, space: FreeSpace, seed: int) -> Found:
         up = np.array([0.0, -self.lift, 0.0, 0.0, 0.0, 0.0])
         path = np.stack([ends.start, ends.start + up, ends.goals[0] + up, ends.goals[0]])
         return Found([path] if space.paths_free([path])[0] else [], "the lifted path is not free")

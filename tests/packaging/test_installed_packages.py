@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 
@@ -14,6 +15,10 @@ from ir_description.cell import shape_register
 from ir_description.files import bundled_controllers
 from ir_description.files.worlds import read_world
 from ir_planner import Planner, PlanOptions
+from ir_planner.checks import FreeSpace
+from ir_planner.request import Work
+from ir_planner.search import Ends, Found
+from ir_planner.search.registry import made_search
 from ir_planner.service import EXIT_SEARCHES
 from ir_recorder.errors import RecorderError
 from ir_recorder.traces import read_traces
@@ -21,6 +26,7 @@ from ir_sim_driver import SimulationSettings
 from ir_sim_driver.errors import SettingsError
 from ir_sim_driver.plant import make_backend
 from ir_sim_driver.plc import LINKS, WRITERS, usable_links
+from ir_values.errors import InvalidValueError
 
 MODULE = '''
 from dataclasses import dataclass, replace
@@ -93,6 +99,19 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: everything\nVersion: 2.0\n")
     (info / "entry_points.txt").write_text(ENTRIES)
     monkeypatch.syspath_prepend(str(tmp_path))
+
+
+@dataclass(frozen=True)
+class Demanding:
+    """A search whose method wants more than the port gives."""
+
+    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+        return Found([])
+
+
+def test_a_search_that_wants_more_than_the_port_gives_is_refused_before_it_is_asked() -> None:
+    with pytest.raises(InvalidValueError, match=r"takes ends, space and seed: .*'work'"):
+        made_search("demanding", Demanding)
 
 
 def test_an_exit_search_is_asked_by_name_and_says_whose_it_is() -> None:

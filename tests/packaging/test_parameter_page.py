@@ -14,7 +14,6 @@ from rclpy.node import Node
 from ir_msgs_py.ros.parameters import Parameters, introspect_services
 from ir_planner import PlannerSettings
 from ir_planner.checks import FreeSpace
-from ir_planner.request import Work
 from ir_planner.search import SEARCHES, Ends, Found
 from ir_program_runner.node import declare_parameters
 from ir_recorder.node.recorder import declared_settings
@@ -54,7 +53,7 @@ class Guess:
 
     tries: int = setting(3, "How often it guesses.", minimum=1, maximum=9)
 
-    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+    def find(self, ends: Ends, space: FreeSpace, seed: int) -> Found:
         return Found([])
 
 

@@ -103,7 +103,7 @@ def charged(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[int], None]]
 def loaded_host(scene_of: SceneOf) -> host.Host:
     """The process that has loaded OMPL."""
     ends, space = a_task(scene_of("table_columns"), free_work())
-    assert SEARCHES["rrt_connect"].find(ends, space, 1, space.work).paths
+    assert SEARCHES["rrt_connect"].find(ends, space, 1).paths
     assert host._host is not None
     return host._host
 
@@ -121,7 +121,7 @@ def test_a_stopped_host_costs_a_request_its_time_and_no_more(
     scene_of: SceneOf, stopped_host: host.Host
 ) -> None:
     ends, space = a_task(scene_of("table_columns"), ticking())
-    found = in_time(lambda: SEARCHES["rrt"].find(ends, space, 1, space.work))
+    found = in_time(lambda: SEARCHES["rrt"].find(ends, space, 1))
     assert isinstance(found, Found)
     assert found.paths == []
     assert "not ready within planning_time" in found.note
@@ -134,7 +134,7 @@ def test_a_request_to_a_stopped_host_can_be_cancelled(
     looks = itertools.count()
     work = Work(10_000_000, 1.0, lambda: 0.0, lambda: next(looks) > 3)
     ends, space = a_task(scene_of("table_columns"), work)
-    assert isinstance(in_time(lambda: SEARCHES["rrt"].find(ends, space, 1, work)), CancelledError)
+    assert isinstance(in_time(lambda: SEARCHES["rrt"].find(ends, space, 1)), CancelledError)
 
 
 def test_a_host_that_answers_nobody_is_replaced(
@@ -148,7 +148,7 @@ def test_a_host_that_answers_nobody_is_replaced(
     monkeypatch.setattr(host, "_PATIENCE", 10)
     monkeypatch.setattr(host, "_dropped", stop_waiting)
     ends, space = a_task(scene_of("table_columns"), free_work())
-    found = in_time(lambda: SEARCHES["rrt_connect"].find(ends, space, 1, space.work))
+    found = in_time(lambda: SEARCHES["rrt_connect"].find(ends, space, 1))
     assert isinstance(found, Found)
     assert found.paths
     assert host._host is not stopped_host
@@ -168,8 +168,8 @@ def test_a_process_that_is_stopped_before_it_reads_a_long_problem(
 
     charged(stop)
     ends, space = a_task(scene_of("table_columns"), ticking())
-    long = FreeSpace(space.scene, np.zeros(1_000_000), space.work)
-    found = in_time(lambda: SEARCHES["rrt"].find(ends, long, 1, space.work))
+    long = FreeSpace(space.scene, np.zeros(1_000_000))
+    found = in_time(lambda: SEARCHES["rrt"].find(ends, long, 1))
     assert isinstance(found, Found)
     assert found.paths == []
     wait_for(lambda: gone(seen[0]), what="the end of the process")
@@ -181,7 +181,7 @@ def test_a_process_that_is_killed_is_an_answer_without_a_path(
 ) -> None:
     charged(lambda process: os.kill(process, signal.SIGKILL))
     ends, space = a_task(scene_of("table_columns"), free_work())
-    found = in_time(lambda: SEARCHES[name].find(ends, space, 1, space.work))
+    found = in_time(lambda: SEARCHES[name].find(ends, space, 1))
     assert isinstance(found, Found)
     assert found.paths == []
     assert "ended without an answer" in found.note
@@ -196,7 +196,7 @@ def test_many_requests_leave_no_process_and_no_descriptor(
 
     def ask(seed: int) -> Counter[str]:
         ends, space = a_task(scene, free_work(400))
-        SEARCHES["rrt_connect"].find(ends, space, seed, space.work)
+        SEARCHES["rrt_connect"].find(ends, space, seed)
         return opened()
 
     open_at_first = ask(0)
@@ -283,7 +283,7 @@ planner = Planner("table_columns", clock=lambda: 0.0)
 task = planner.cell.task("tL->tR")
 space = FreeSpace.of(planner.scene(), 0.02, Work(10**12, 1.0, lambda: 0.0))
 beyond = np.array([task.goal]) + 50.0  # of every range: nobody gets there
-SEARCHES[sys.argv[1]].find(Ends(np.array(task.start), beyond), space, 1, space.work)
+SEARCHES[sys.argv[1]].find(Ends(np.array(task.start), beyond), space, 1)
 """
 
 
@@ -310,7 +310,7 @@ def test_two_threads_get_the_paths_that_each_gets_alone(scene_of: SceneOf) -> No
 
     def paths(seed: int) -> list[bytes]:
         ends, space = a_task(scene, free_work(2_000))
-        found = SEARCHES["bkpiece"].find(ends, space, seed, space.work)
+        found = SEARCHES["bkpiece"].find(ends, space, seed)
         return [path.tobytes() for path in found.paths]
 
     alone = [paths(seed) for seed in (1, 2)]

@@ -45,7 +45,7 @@ def test_without_ompl_a_sentence_says_how_to_install_it(
     monkeypatch.setattr(host, "find_spec", lambda name: None)
     ends, space = a_blocked_task(scene_of, Work(1000, 1.0, lambda: 0.0))
     with pytest.raises(RequestError, match="'kpiece': OMPL is missing: pip install"):
-        SEARCHES["kpiece"].find(ends, space, 1, space.work)
+        SEARCHES["kpiece"].find(ends, space, 1)
 
 
 def test_ompl_that_is_installed_but_broken_is_no_search_that_found_nothing(
@@ -60,7 +60,7 @@ def test_ompl_that_is_installed_but_broken_is_no_search_that_found_nothing(
         with pytest.raises(
             RequestError, match=r"'rrt': OMPL is installed but can't be loaded: libompl.so"
         ):
-            SEARCHES["rrt"].find(ends, space, 1, space.work)
+            SEARCHES["rrt"].find(ends, space, 1)
     finally:
         if host._host is not None:
             host._host.close()
@@ -103,7 +103,7 @@ def test_a_roadmap_to_several_goals_is_checked_in_one_thread(scene_of: SceneOf) 
 def test_a_roadmap_to_several_goals_leads_from_the_start_to_one_of_them(scene_of: SceneOf) -> None:
     ends, space = a_blocked_task(scene_of, Work(100_000, 1.0, lambda: 0.0))
     ends = Ends(ends.start, np.concatenate([ends.goals, ends.goals - 0.01]))
-    (path,) = SEARCHES["prm"].find(ends, space, 1, space.work).paths
+    (path,) = SEARCHES["prm"].find(ends, space, 1).paths
     assert np.array_equal(path[0], ends.start)
     assert any(np.array_equal(path[-1], goal) for goal in ends.goals)
 
@@ -115,7 +115,7 @@ def test_at_the_ceiling_it_is_killed(scene_of: SceneOf) -> None:
     ends = Ends(
         ends.start, ends.goals + np.array([0.0, 0.0, 0.0, 0.0, 0.0, 50.0])
     )  # beyond every range
-    found = SEARCHES["rrt"].find(ends, space, 1, space.work)
+    found = SEARCHES["rrt"].find(ends, space, 1)
     assert found.paths == []
     assert space.work.truncated
 
@@ -136,7 +136,7 @@ def test_each_process_is_charged_while_it_is_there(
     with_ompl.charge_to(charge)
     ends, space = a_blocked_task(scene_of, Work(10_000, 1.0, lambda: 0.0))
     for seed in range(2):
-        assert SEARCHES["rrt_connect"].find(ends, space, seed, space.work).paths
+        assert SEARCHES["rrt_connect"].find(ends, space, seed).paths
     assert len(set(charged)) == 2
 
 
@@ -145,7 +145,7 @@ def test_a_request_that_is_cancelled_meanwhile_raises(scene_of: SceneOf) -> None
     work = Work(10_000_000, 1.0, lambda: 0.0, lambda: next(looks) > 3)
     ends, space = a_blocked_task(scene_of, work)
     with pytest.raises(CancelledError):
-        SEARCHES["rrt"].find(Ends(ends.start, ends.goals + 50.0), space, 1, work)
+        SEARCHES["rrt"].find(Ends(ends.start, ends.goals + 50.0), space, 1)
 
 
 def test_a_process_that_dies_is_an_answer_without_a_path(
@@ -157,7 +157,7 @@ def test_a_process_that_dies_is_an_answer_without_a_path(
     asked = adapter.asked
     monkeypatch.setattr(adapter, "asked", no_planner)
     ends, space = a_blocked_task(scene_of, Work(1000, 1.0, lambda: 0.0))
-    found = with_ompl.Rrt().find(ends, space, 1, space.work)
+    found = with_ompl.Rrt().find(ends, space, 1)
     assert found.paths == []
     assert "AttributeError" in found.note
 
@@ -183,7 +183,7 @@ def test_what_ompl_answers_is_never_returned_unchecked(
     ends, space = a_blocked_task(scene_of, Work(100_000, 1.0, lambda: 0.0))
     straight = np.stack([ends.start, ends.goals[0]])
     monkeypatch.setattr(adapter, "asked", lambda problem, work: OmplAnswer(straight, 1))
-    (path,) = with_ompl.Rrt().find(ends, space, 1, space.work).paths
+    (path,) = with_ompl.Rrt().find(ends, space, 1).paths
     assert (space.certificates(path[:-1].copy(), path[1:].copy()).verdict == FREE).all()
 
 

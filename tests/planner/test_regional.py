@@ -153,7 +153,7 @@ def test_a_search_that_misses_a_free_straight_movement_is_named(
     class Blind:
         """Finds nothing."""
 
-        def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+        def find(self, ends: Ends, space: FreeSpace, seed: int) -> Found:
             return Found([], "looked away")
 
     scene = scene_of("open")

@@ -214,7 +214,7 @@ class Unaware:
 
     asked: list[int] = dataclasses.field(default_factory=list)
 
-    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+    def find(self, ends: Ends, space: FreeSpace, seed: int) -> Found:
         self.asked.append(seed)
         return Found([])
 

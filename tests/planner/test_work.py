@@ -54,7 +54,7 @@ def test_sbl_exceeds_its_work_nowhere(scene_of: SceneOf) -> None:
     ends = Ends(np.array(task.start), np.array([task.goal]))
     for allowed in range(1, 60):
         space = FreeSpace.of(scene, 0.02, Work(allowed, 1.0, lambda: 0.0))
-        SEARCHES["sbl"].find(ends, space, allowed, space.work)
+        SEARCHES["sbl"].find(ends, space, allowed)
         assert space.work.iterations <= allowed
 
 

@@ -44,7 +44,6 @@ from typing import ClassVar
 import numpy as np
 
 from ir_planner.checks import FreeSpace
-from ir_planner.request import Work
 from ir_planner.scene import path_cost
 from ir_planner.search import Ends, Found
 from ir_values.settings import check_settings, setting
@@ -60,12 +59,12 @@ class {type}:
     def __post_init__(self) -> None:
         check_settings(self)
 
-    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+    def find(self, ends: Ends, space: FreeSpace, seed: int) -> Found:
         """The straight movements, and paths over vias until some are free or the work is spent."""
         rng = np.random.default_rng(seed)
         candidates = [np.stack([ends.start, goal]) for goal in ends.goals]
         free = self._free(candidates, space)
-        while not free and not work.exhausted:
+        while not free and not space.work.exhausted:
             vias = rng.uniform(space.low, space.high, (self.vias, len(ends.start)))
             goals = ends.goals[rng.integers(len(ends.goals), size=self.vias)]
             pairs = zip(vias, goals, strict=True)

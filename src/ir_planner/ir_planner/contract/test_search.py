@@ -97,7 +97,7 @@ def answers_again(search: Search, seed: int = SEED) -> list[Answer]:
         scene = scene_of(cell)
         space = FreeSpace.of(scene, SAFETY_DISTANCE, enough_work(search))
         ends = asked(scene, task)
-        paths = search.find(ends, space, seed, space.work)
+        paths = search.find(ends, space, seed)
         found.append((paths, space, ends, space.work.iterations))
     return found
 
@@ -158,7 +158,7 @@ def paths_keep_the_tool_upright(search: Search) -> None:
         ends = asked(scene, task)
         cone = upright_cone(scene, ends.start)
         space = FreeSpace.of(scene, SAFETY_DISTANCE, enough_work(search), cone=cone)
-        for path in search.find(ends, space, SEED, space.work).paths:
+        for path in search.find(ends, space, SEED).paths:
             solved += 1
             largest = float(cone.tilts(sampled(path)).max())
             assert largest <= LARGEST_TILT + TILT_TOLERANCE, "the tool leans too far"
@@ -185,7 +185,7 @@ def test_it_ends_when_its_work_is_spent(search: Search, most: int) -> None:
     """A batch that has begun may be finished: at most as much again as a first look costs."""
     scene = scene_of("deep_box")
     space = FreeSpace.of(scene, SAFETY_DISTANCE, unhurried(most))
-    search.find(asked(scene, "tun->bin"), space, SEED, space.work)
+    search.find(asked(scene, "tun->bin"), space, SEED)
     assert space.work.iterations <= most + 2_000
 
 
@@ -193,7 +193,7 @@ def test_it_stops_when_it_is_asked_to(search: Search) -> None:
     scene = scene_of("deep_box")
     space = FreeSpace.of(scene, SAFETY_DISTANCE, unhurried(cancelled=lambda: True))
     with pytest.raises(CancelledError):
-        search.find(asked(scene, "tun->bin"), space, SEED, space.work)
+        search.find(asked(scene, "tun->bin"), space, SEED)
 
 
 def test_it_finds_nothing_where_no_path_leads(search: Search) -> None:
@@ -208,7 +208,7 @@ def test_it_finds_nothing_where_no_path_leads(search: Search) -> None:
     reach = FreeSpace.of(scene, SAFETY_DISTANCE, unhurried())
     assert reach.states_free(np.vstack((ends.start, ends.goals))).all()
     space = FreeSpace.of(scene, SAFETY_DISTANCE, unhurried(2_000))
-    assert search.find(ends, space, SEED, space.work).paths == []
+    assert search.find(ends, space, SEED).paths == []
 
 
 def test_its_settings_are_fields_with_a_sentence_and_a_range(search: Search) -> None:
@@ -258,7 +258,7 @@ def test_the_settings_tree_holds_every_search() -> None:
 class Careless:
     """Answers with the straight movement, free or not, and looks at nothing."""
 
-    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+    def find(self, ends: Ends, space: FreeSpace, seed: int) -> Found:
         return Found([np.stack([ends.start, ends.goals[0]])])
 
 

@@ -54,7 +54,7 @@ def first_paths(
     for name, search in _attempts(context, searches, briefly):
         with journal.stage(name) as notes:
             notes.extend(filter(None, [SEARCHES.origin(name)]))
-            found = search.find(ends, space, context.options.seed, space.work)
+            found = search.find(ends, space, context.options.seed)
             if found.paths:
                 notes.append(
                     f"first feasible: {len(found.paths)} free, {len(found.paths[0])} points"
@@ -127,7 +127,7 @@ def improve(
                 later = turn == 0 and len(explorers) > 1 and role_of(name).costly
                 if more() and not later:
                     seed = _seed(context.options.seed, turn, name)
-                    found = quick(searches[name]).find(ends, portfolio.space, seed, work)
+                    found = quick(searches[name]).find(ends, portfolio.space, seed)
                     new[name] += portfolio.add(name, found.paths)
             certified += portfolio.refine_best(_REFINED) if more() else 0
             if more():

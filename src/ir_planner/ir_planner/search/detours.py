@@ -13,7 +13,6 @@ from typing import ClassVar
 import numpy as np
 
 from ir_planner.checks import FreeSpace
-from ir_planner.request import Work
 from ir_planner.search.port import Ends, Found
 from ir_planner.search.variety import NEAREST_GOALS, different_paths
 from ir_values.arrays import FloatArray
@@ -88,7 +87,7 @@ class Detours:
     def __post_init__(self) -> None:
         check_settings(self)
 
-    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+    def find(self, ends: Ends, space: FreeSpace, seed: int) -> Found:
         """Certify the candidates to the nearest goals."""
         cell = space.scene.cell
         postures = [np.array(cell.park), np.array(cell.machine_home)]
@@ -125,7 +124,7 @@ class Retract:
     def __post_init__(self) -> None:
         check_settings(self)
 
-    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+    def find(self, ends: Ends, space: FreeSpace, seed: int) -> Found:
         """Retract from the start and the nearest goals."""
         rng = np.random.default_rng(seed)
         goals = ends.goals[:NEAREST_GOALS]
@@ -211,7 +210,7 @@ class Direct:
     def __post_init__(self) -> None:
         check_settings(self)
 
-    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+    def find(self, ends: Ends, space: FreeSpace, seed: int) -> Found:
         """Certify the straight movement to every goal, also where no work is left: what is free at
         once is found with any work.
         """

@@ -17,7 +17,6 @@ from ir_kernels import portable
 from ir_kernels.collision import FREE, Certificates
 from ir_msgs_py.search_log import CorrectionLog
 from ir_planner.checks import FreeSpace, first_too_near
-from ir_planner.request import Work
 from ir_planner.scene import PlanningScene, path_cost
 from ir_planner.search.population import SAMPLES_MAX, Evolution, GeneticSettings, batch_work, evolve
 from ir_planner.search.port import Correction, Ends, Found, Stretch
@@ -36,7 +35,7 @@ class Genetic(GeneticSettings):
         """Each stretch is tried once."""
         return replace(self, attempts=1)
 
-    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+    def find(self, ends: Ends, space: FreeSpace, seed: int) -> Found:
         """Correct the straight movement to the nearest goal that it succeeds for."""
         rng = np.random.default_rng(seed)
         nearest: tuple[float, str] = (np.inf, "")

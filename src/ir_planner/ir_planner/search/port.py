@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from ir_planner.checks import FreeSpace
-from ir_planner.request import Work
 from ir_values.arrays import FloatArray
 
 
@@ -64,14 +63,13 @@ class Found:
 class Search(Protocol):
     """Looks for free paths."""
 
-    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
-        """Paths whose every step `space` certifies (which charges the step to its work, the same as
-        `work`).
+    def find(self, ends: Ends, space: FreeSpace, seed: int) -> Found:
+        """Paths whose every step `space` certifies, which charges the step to `space.work`.
 
         The same ends, space and seed give the same paths; a search that can't promise that has a
         class attribute `repeatable = False`, and one that heeds the cone of the space
-        `keeps_upright = True`. Ends early when `work.exhausted`; what a search does
-        beside certifying steps it charges itself. Raises CancelledError when asked to stop.
+        `keeps_upright = True`. Ends early when `space.work.exhausted`; what a search does beside
+        certifying steps it charges itself. Raises CancelledError when asked to stop.
         """
 
 

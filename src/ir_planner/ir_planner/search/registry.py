@@ -2,6 +2,7 @@
 line here; or an entry point of an installed package, in the group `ir_planner.searches`.
 """
 
+import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, is_dataclass
 from types import MappingProxyType
@@ -10,7 +11,6 @@ from typing import Any, cast
 from ir_msgs_py.status import StatusCode
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import RequestError
-from ir_planner.request import Work
 from ir_planner.search.detours import Detours, Direct, Retract
 from ir_planner.search.genetic_correction import Genetic
 from ir_planner.search.port import Ends, Found, Search
@@ -41,7 +41,7 @@ class UnusableSearch:
 
     why: str = setting("", "Why the installed package can't be used.", read_only=True)
 
-    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+    def find(self, ends: Ends, space: FreeSpace, seed: int) -> Found:
         """Raises RequestError."""
         raise RequestError(StatusCode.INVALID_GOAL_CONSTRAINTS, f"planner_id: {self.why}")
 
@@ -51,8 +51,13 @@ def made_search(name: str, value: Any) -> Search:
     InvalidValueError.
     """
     search = value() if isinstance(value, type) else value
-    if not (is_dataclass(search) and callable(getattr(search, "find", None))):
+    find = getattr(search, "find", None)
+    if not (is_dataclass(search) and callable(find)):
         raise InvalidValueError("must be a frozen dataclass with a method find")
+    try:
+        inspect.signature(find).bind(ends=None, space=None, seed=0)
+    except TypeError as error:
+        raise InvalidValueError(f"its method find takes ends, space and seed: {error}") from error
     describe(type(search))
     return cast(Search, search)
 

@@ -16,7 +16,6 @@ from typing import ClassVar
 import numpy as np
 
 from ir_planner.checks import FreeSpace
-from ir_planner.request import Work
 from ir_planner.search.port import Ends, Found
 from ir_planner.search.variety import NEAREST_GOALS
 from ir_values.arrays import BoolArray, FloatArray, IntArray
@@ -160,7 +159,7 @@ class Sbl:
     def __post_init__(self) -> None:
         check_settings(self)
 
-    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+    def find(self, ends: Ends, space: FreeSpace, seed: int) -> Found:
         """One path, or none."""
         return _Sbl(self, ends, space, np.random.default_rng(seed)).found()
 

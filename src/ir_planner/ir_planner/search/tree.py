@@ -11,7 +11,6 @@ import numpy as np
 
 from ir_kernels.search import BidirectionalTree
 from ir_planner.checks import FreeSpace
-from ir_planner.request import Work
 from ir_planner.scene import ToolCone
 from ir_planner.search.port import Ends, Found
 from ir_values.arrays import BoolArray, FloatArray, IntArray
@@ -251,7 +250,7 @@ class Tree:
         """Trees that are given up early."""
         return replace(self, edges=min(self.edges, self.quick_edges))
 
-    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+    def find(self, ends: Ends, space: FreeSpace, seed: int) -> Found:
         """Grow until the trees meet."""
         found = connect(ends.start, ends.goals, space, seed, self.edges)
         if found.path is not None:

@@ -8,7 +8,6 @@ import numpy as np
 from ir_msgs_py.status import StatusCode
 from ir_planner.checks import FreeSpace
 from ir_planner.errors import RequestError
-from ir_planner.request import Work
 from ir_planner.search.port import Ends, Found
 from ir_planner.search.tree import connect
 from ir_planner.search.variety import NEAREST_GOALS
@@ -28,7 +27,6 @@ def found_by(
     ends: Ends,
     space: FreeSpace,
     seed: int,
-    work: Work,
 ) -> Found:
     """What OMPL's planner finds with `edges` checks at most; every step of its path is certified
     here: some of them smooth their paths without asking.
@@ -37,6 +35,7 @@ def found_by(
     stop.
     """
     check_installed(name)
+    work = space.work
     checks = min(edges, int(_SHARE * work.left))
     if checks == 0 or work.exhausted:
         return Found([], "no work was left")
@@ -118,10 +117,10 @@ class OmplSearch:
         """Size [rad] of the cells of a grid over the first joints; 0: OMPL's own."""
         return 0.0
 
-    def find(self, ends: Ends, space: FreeSpace, seed: int, work: Work) -> Found:
+    def find(self, ends: Ends, space: FreeSpace, seed: int) -> Found:
         """One path, or none."""
         parameters = OmplParameters(self.planner, self.parameters(), self.cells(), self.reverse)
-        return found_by(self.planner_id, parameters, self.edges, ends, space, seed, work)
+        return found_by(self.planner_id, parameters, self.edges, ends, space, seed)
 
 
 @dataclass(frozen=True)
