@@ -168,7 +168,7 @@ def test_a_process_that_is_stopped_before_it_reads_a_long_problem(
 
     charged(stop)
     ends, space = a_task(scene_of("table_columns"), ticking())
-    long = FreeSpace(space.scene, np.zeros(1_000_000))
+    long = FreeSpace(space.scene, np.zeros(1_000_000), space.work)
     found = in_time(lambda: SEARCHES["rrt"].find(ends, long, 1))
     assert isinstance(found, Found)
     assert found.paths == []
