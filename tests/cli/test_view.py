@@ -71,8 +71,8 @@ class View:
 
     @property
     def stage(self) -> ShownCell:
-        assert self.session._stage is not None
-        return self.session._stage
+        assert self.session._shown_cell is not None
+        return self.session._shown_cell
 
     def until(self, condition: Callable[[], object]) -> None:
         deadline = time.monotonic() + PATIENCE

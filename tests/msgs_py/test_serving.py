@@ -21,8 +21,8 @@ from ir_msgs.action import RunProgram
 from ir_msgs.srv import SetLoad, SetPlcInput
 from ir_msgs_py.ros.rclpy_inside import SENDS, UNDISCOVERED, PatientSender
 from ir_msgs_py.ros.serving import (
+    BYTES_WAITING,
     LOOK,
-    MOST_WAITING,
     BoundedService,
     RecordedActionServer,
     RequestQueue,
@@ -57,7 +57,7 @@ def test_every_request_of_a_burst_is_answered_in_its_order_or_refused(
     server = BackgroundExecutor(ros_context)
     try:
         node = server.add_node(rclpy.create_node("bounded", context=ros_context))
-        server.run(lambda: BoundedService(node, SetPlcInput, "~/ask", handler, waiting=MOST))
+        server.run(lambda: BoundedService(node, SetPlcInput, "~/ask", handler, most_waiting=MOST))
         client = ros_executor.run(
             lambda: ros_node.create_client(SetPlcInput, "/bounded/ask", qos_profile=SERVICE)
         )
@@ -82,10 +82,10 @@ def test_every_request_of_a_burst_is_answered_in_its_order_or_refused(
 
 def test_requests_wait_up_to_a_number_of_bytes_and_the_first_whatever_its_size() -> None:
     queue = RequestQueue("ask")
-    for size in (2 * MOST_WAITING, MOST_WAITING // 2):
+    for size in (2 * BYTES_WAITING, BYTES_WAITING // 2):
         request = SetLoad.Request(inertia=array("d", bytes(size)))
         assert queue.add(request, lambda size=size: size) == ""
-        more = SetLoad.Request(inertia=array("d", bytes(MOST_WAITING // 2 + 8)))
+        more = SetLoad.Request(inertia=array("d", bytes(BYTES_WAITING // 2 + 8)))
         refused = queue.add(more, lambda: "more")
         assert refused.startswith("requests of ask that wait would take more than 64 MiB")
         assert queue.pop() == size

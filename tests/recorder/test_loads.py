@@ -12,7 +12,7 @@ import pytest
 
 from ir_msgs_py.modes import Mode
 from ir_recorder import read_recording
-from ir_recorder.analysis.loads import LoadTimeline, after, load_timeline
+from ir_recorder.analysis.loads import LoadTimeline, load_after, load_timeline
 from ir_recorder.reading.recording import TextEvent
 
 HOME = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
@@ -51,4 +51,4 @@ def test_a_step_of_the_base_load_shows_when_the_tool_came(
     ],
 )
 def test_loads_follow_the_steps(load: str, attach: str, detach: str, expected: str) -> None:
-    assert after(load, attach, detach) == expected
+    assert load_after(load, attach, detach) == expected

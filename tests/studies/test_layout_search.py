@@ -212,7 +212,7 @@ def test_the_placement_as_given_is_the_program_that_a_plan_has() -> None:
     stations = ("p1", "home")
     settings = LayoutSettings(cell="open", stations=stations, base={"x": (-0.1, 0.1)})
     words = {"stage": "plan", "values": {}, "payload": {}, "cycle_time": 0.0, "seed": 0}
-    made = search.maker({**settings.budget, "cell_yaml": cell_to_yaml(load_cell("open"))})
+    made = search.row_maker({**settings.budget, "cell_yaml": cell_to_yaml(load_cell("open"))})
     row = made(words)
     plan = Planner("open", clock=lambda: 0.0).plan_program(stations=stations)
     assert row["energy_j"] == plan.report.energy
@@ -226,7 +226,7 @@ def test_a_year_of_a_layout_has_the_cycles_that_a_plan_of_it_has() -> None:
     stations = ("p1", "home")
     settings = LayoutSettings(cell="open", stations=stations, base={"x": (-0.1, 0.1)})
     words = {"stage": "plan", "values": {}, "payload": {}, "cycle_time": 0.0, "seed": 0}
-    made = search.maker({**settings.budget, "cell_yaml": cell_to_yaml(load_cell("open"))})
+    made = search.row_maker({**settings.budget, "cell_yaml": cell_to_yaml(load_cell("open"))})
     own = made(words)
     given = made({**words, "robots": True})
     plan = Planner("open", clock=lambda: 0.0).plan_program(stations=stations, savings=True)

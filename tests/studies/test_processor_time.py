@@ -17,7 +17,14 @@ from ir_msgs_py.status import StatusCode
 from ir_planner import Goal, Planner, RequestError
 from ir_planner.search.with_ompl import charge_to, missing
 from ir_studies.arena import ArenaSettings
-from ir_studies.arena.one_run import charged, excuse, maker, others_time, processor_time, warm_up
+from ir_studies.arena.one_run import (
+    charged,
+    excuse,
+    others_time,
+    processor_time,
+    row_maker,
+    warm_up,
+)
 from ir_studies.arena.settings import ArenaEntry
 from ir_values.arrays import FloatArray
 
@@ -91,7 +98,7 @@ def test_what_ompls_processes_need_to_start_is_measured_and_counts_for_nobody(
     excused: list[float] = []
     monkeypatch.setattr("ir_studies.arena.one_run.excuse", excused.append)
     try:
-        start = maker(asdict(settings))({**asdict(ENTRY)})["start_s"]
+        start = row_maker(asdict(settings))({**asdict(ENTRY)})["start_s"]
         assert excused == [0.0, start]
         assert start > 0.0
         assert warm_up(settings) > 0.0

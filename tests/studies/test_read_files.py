@@ -15,9 +15,9 @@ from ir_description.cell import Task
 from ir_recorder.recording.arithmetic import arithmetic
 from ir_studies import Means, run_arena
 from ir_studies.arena import ArenaSettings
-from ir_studies.arena.one_run import maker as arena_maker
+from ir_studies.arena.one_run import row_maker as arena_maker
 from ir_studies.errors import StudyError
-from ir_studies.statistics.runs import maker as statistics_maker
+from ir_studies.statistics.runs import row_maker as statistics_maker
 from ir_studies.work import fingerprint
 from ir_studies.work.results import digest_of_tasks, refuse_others, task_digests
 

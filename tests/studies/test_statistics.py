@@ -23,7 +23,7 @@ from ir_studies import Means, read_study
 from ir_studies.errors import SettingsError, StudyError
 from ir_studies.statistics.findings import findings_of
 from ir_studies.statistics.outputs import columns, page_html, summary_of
-from ir_studies.statistics.runs import NEAREST, maker, pair_of, places_of
+from ir_studies.statistics.runs import NEAREST, pair_of, places_of, row_maker
 from ir_studies.statistics.settings import EXAMPLE, StatisticsSettings, statistics_settings
 from ir_studies.studies import Study, StudyAnswer, study_of
 
@@ -251,7 +251,7 @@ def test_a_pair_is_planned_driven_and_measured_in_two_ways(study_of_a_pair: Stud
 @pytest.mark.long
 def test_a_pair_is_made_alike_in_any_process(study_of_a_pair: StudyOfAPair) -> None:
     asked = {"cell": "open", "pairs": 1, "seed": 3, "plant": "nominal"}
-    assert maker(asked)({"number": 0}) == study_of_a_pair.row
+    assert row_maker(asked)({"number": 0}) == study_of_a_pair.row
 
 
 @pytest.mark.long
@@ -277,7 +277,7 @@ def test_a_cell_without_places_is_a_sentence(tmp_path: Path) -> None:
     cell = tmp_path / "empty.yaml"
     cell.write_text("format: ir_cell/1\nname: empty\nrobot: kr6_r900_2\n")
     asked = StatisticsSettings(str(cell))
-    make = maker({"cell": str(cell)})
+    make = row_maker({"cell": str(cell)})
     rows = [make({"number": number}) for number in range(2)]
     said = summary_of(findings_of(rows), asked)
     assert "2 pairs without both movements: the cell empty has no two places that keep 2 mm" in said

@@ -60,16 +60,47 @@ def _rounded(seconds: float) -> str:
     return f"{max(seconds, 1.0):.0f} s"
 
 
+class _Progress:
+    """The line that says how far a study is."""
+
+    def __init__(self) -> None:
+        self.line = ProgressLine()
+        self._left = TimeLeft()
+        self._done = 0
+        self._of = 0
+
+    def show(self, phase: str, done: int, of: int, best: str) -> None:
+        """So many of the jobs of a phase are done; best: the best result so far."""
+        self._done = done
+        self._of = of
+        text = f"{best}; {phase}" if best else phase
+        self.line.show(text, done, of, 0.0, self._left.words(phase, done, of))
+
+    @property
+    def reached(self) -> str:
+        """How many jobs were done, nothing before the first."""
+        return f" after {self._done} of {self._of}" if self._of else ""
+
+
 def add_study(parser: argparse.ArgumentParser, folder: str) -> None:
     """SETTINGS.yaml, -o, --workers, --scheduler and --example."""
     parser.add_argument("settings", nargs="?", metavar="SETTINGS.yaml", help="what is asked")
     parser.add_argument(
         "-o", "--output", default=folder, metavar="FOLDER", help=f"results ({folder})"
     )
-    words = f"processes, 1 to {MOST_WORKERS} (as many as cores)"
-    parser.add_argument("--workers", type=int, default=0, metavar="N", help=words)
-    words = "of a Dask cluster that makes the jobs instead, as tcp://127.0.0.1:8786"
-    parser.add_argument("--scheduler", default="", metavar="ADDRESS", help=words)
+    parser.add_argument(
+        "--workers",
+        type=int,
+        default=0,
+        metavar="N",
+        help=f"processes, 1 to {MOST_WORKERS} (as many as cores)",
+    )
+    parser.add_argument(
+        "--scheduler",
+        default="",
+        metavar="ADDRESS",
+        help="of a Dask cluster that makes the jobs instead, as tcp://127.0.0.1:8786",
+    )
     parser.add_argument(
         "--example", action="store_true", help="print a settings file with all keys, and end"
     )
@@ -84,22 +115,15 @@ def settings_of(arguments: argparse.Namespace, command: str) -> str:
 
 def studied(arguments: argparse.Namespace, make: Callable[[Means], Made]) -> Made:
     """What `make` returns, with a line that says how far it is."""
-    made = [0, 0]
-    left = TimeLeft()
     if not 0 <= arguments.workers <= MOST_WORKERS:
         raise InputError(f"--workers is {arguments.workers}: it must be in 1 .. {MOST_WORKERS}")
-
-    def show(phase: str, done: int, of: int, best: str) -> None:
-        made[:] = done, of
-        line.show(f"{best}; {phase}" if best else phase, done, of, 0.0, left.words(phase, done, of))
-
+    progress = _Progress()
     try:
-        with ProgressLine() as line:
-            return make(Means(arguments.workers, arguments.scheduler, show))
+        with progress.line:
+            return make(Means(arguments.workers, arguments.scheduler, progress.show))
     except KeyboardInterrupt:
         with suppress(BrokenPipeError):
-            done = f" after {made[0]} of {made[1]}" if made[1] else ""
-            sys.stderr.write(f"stopped{done}: the same command goes on from there\n")
+            sys.stderr.write(f"stopped{progress.reached}: the same command goes on from there\n")
         raise
 
 
@@ -151,11 +175,12 @@ _QUICK_S = 0.2  # of processor per run: 550 runs of the example take two minutes
 def add_arena(arena: argparse.ArgumentParser) -> None:
     """Arguments of `ir study arena`."""
     add_study(arena, _FOLDER)
-    words = (
-        f"one seed and {_QUICK_S:g} s per run, in {_QUICK_FOLDER}; without SETTINGS.yaml "
-        "those of --example"
+    arena.add_argument(
+        "--quick",
+        action="store_true",
+        help=f"one seed and {_QUICK_S:g} s per run, in {_QUICK_FOLDER}; without SETTINGS.yaml "
+        "those of --example",
     )
-    arena.add_argument("--quick", action="store_true", help=words)
     arena.add_argument("--parquet", action="store_true", help="also table.parquet; needs pyarrow")
     arena.set_defaults(run=run_arena_command)
 
@@ -194,8 +219,13 @@ _HURRIED_GAP = 1e-3
 def add_cells(cells: argparse.ArgumentParser) -> None:
     """Arguments of `ir study cells`."""
     cells.add_argument("file", metavar="FILE.xml", help="instances of the public benchmark")
-    words = f"of processor time per instance, at most ({_CELL_S:g})"
-    cells.add_argument("--seconds", type=float, default=_CELL_S, metavar="S", help=words)
+    cells.add_argument(
+        "--seconds",
+        type=float,
+        default=_CELL_S,
+        metavar="S",
+        help=f"of processor time per instance, at most ({_CELL_S:g})",
+    )
     cells.add_argument("--json", action="store_true", help="print the schedules as JSON")
     cells.set_defaults(run=run_cells)
 

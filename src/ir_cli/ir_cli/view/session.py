@@ -162,9 +162,9 @@ class Session:
     """
 
     def __init__(
-        self, shown: Watched | Recorded, stations: tuple[str, ...] = (), port: int = 0
+        self, source: Watched | Recorded, stations: tuple[str, ...] = (), port: int = 0
     ) -> None:
-        self._shown = shown
+        self._source = source
         self._stations = stations
         self._inbox = Inbox()
         self._stream = Stream()
@@ -175,14 +175,14 @@ class Session:
         self._moves: dict[DragTarget, FloatArray] = {}
         self._file: Cell | None = None
         self._drawn: Cell | None = None  # as the scene has it
-        self._stage: ShownCell | None = None
+        self._shown_cell: ShownCell | None = None
         self._looked = time.monotonic()
         self._beat = self._looked
         self._controls = {
-            "joints": ViewControl(self._joints, (list,)),
-            "at": ViewControl(self._at, (str,)),
-            "time": ViewControl(self._time, (int, float)),
-            "move": ViewControl(self._move, (list,)),
+            "joints": ViewControl(self._stand_at_joints, (list,)),
+            "at": ViewControl(self._stand_at_place, (str,)),
+            "time": ViewControl(self._show_time, (int, float)),
+            "move": ViewControl(self._move_target, (list,)),
             "undo": ViewControl(self._undo),
             "save": ViewControl(self._save),
             "plan": ViewControl(lambda _: self._ask()),
@@ -194,16 +194,19 @@ class Session:
             self._stream, self._press, lambda: self._scene, port, site=CELL_SITE
         )
         self._worker = PlanWorker(
-            self._inbox, Listener(self._checked, self._progress, self._planned)
+            self._inbox, Listener(self._show_access, self._show_progress, self._show_plan)
         )
-        self._say(name=one_line(shown.name, MOST_WORDS), source=one_line(shown.source, _LINE))
+        self._say(name=one_line(source.name, MOST_WORDS), source=one_line(source.source, _LINE))
         self._read()
 
     def run(self, until: float = np.inf) -> None:
         """Do what browsers, file and planner ask for, until the monotonic clock says `until`
         [s].
         """
-        while (now := time.monotonic()) < until:
+        while True:
+            now = time.monotonic()
+            if now >= until:
+                return
             for action in self._inbox.take(LOOK / 3.0):
                 action()
             if now - self._beat >= BEAT:
@@ -211,7 +214,7 @@ class Session:
                 self._stream.add({})
             if now - self._looked >= LOOK:
                 self._looked = now
-                if self._shown.changed(now):
+                if self._source.changed(now):
                     self._read()
 
     def close(self) -> None:
@@ -244,56 +247,61 @@ class Session:
         """Take the file as it is now; where it has errors, these stand beside the cell that it
         had.
         """
-        reading = self._shown.read()
+        reading = self._source.read()
         cell = reading.cell
         file = self._file
         errors = [one_line(error, _LINE) for error in reading.errors]
         if cell is not None and (file is None or cell_to_yaml(cell) != cell_to_yaml(file)):
             note = "read again; what was moved is dropped" if self._moves else ""
             self._show(cell, note)
-        if self._stage is None:
+        if self._shown_cell is None:
             self._say(errors=["the file can't be read:", *errors])
             return
-        self._stage.errors = tuple(reading.errors)
+        self._shown_cell.errors = tuple(reading.errors)
         first = "the file can't be read; the last cell that could be read is shown:"
-        self._say(errors=[first, *errors] if errors else [], blamed=list(self._stage.blamed()))
+        self._say(errors=[first, *errors] if errors else [], blamed=list(self._shown_cell.blamed()))
 
     def _show(self, cell: Cell, note: str) -> None:
         """Another cell from the file: everything is drawn again."""
-        other = self._file is None or self._file.robot.document != cell.robot.document
-        other |= self._file is not None and self._file.robot.name != cell.robot.name
-        before = self._stage
-        q = np.array(cell.machine_home) if other or before is None else before.q
+        before = self._shown_cell
+        same_robot = self._file is not None and (
+            self._file.robot.document == cell.robot.document
+            and self._file.robot.name == cell.robot.name
+        )
+        q = before.q if same_robot and before is not None else np.array(cell.machine_home)
         self._file = cell
         self._moves = {}
-        stage = ShownCell(cell, q)
-        self._stage = stage
-        stage.note = note
-        stage.stand(q)
+        shown = ShownCell(cell, q)
+        self._shown_cell = shown
+        shown.note = note
+        shown.stand(q)
         self._say(name=one_line(cell.name, MOST_WORDS), compared="", stations=[], tiles=[])
-        if isinstance(self._shown, Recorded):
+        if isinstance(self._source, Recorded):
             self._replay(True)
         else:
             self._draw(still_content(cell))
-            self._by_hand()
+            self._show_by_hand()
             self._ask()
+
+    def _cell_on_page(self) -> ShownCell:
+        """The cell that is shown, once a first one could be read."""
+        assert self._shown_cell is not None
+        return self._shown_cell
 
     def _draw(self, scene: bytes) -> None:
         """Another scene, of the cell as it stands now."""
-        stage = self._stage
-        assert stage is not None
+        shown = self._cell_on_page()
         self._scene = scene
-        self._drawn = stage.cell
+        self._drawn = shown.cell
         self._scenes += 1
-        self._say(scene=str(self._scenes), **self._standing())
+        self._say(scene=str(self._scenes), **self._standing_values())
 
-    def _standing(self) -> dict[str, Json]:
+    def _standing_values(self) -> dict[str, Json]:
         """Where machines and stations stand: in the world, and against the scene."""
-        stage = self._stage
+        shown = self._cell_on_page()
         drawn = self._drawn
-        assert stage is not None
-        assert drawn is not None
-        cell = stage.cell
+        assert drawn is not None  # a scene comes before anything that stands in it
+        cell = shown.cell
         poses: dict[str, Json] = {}
         for target in targets(cell):
             here = (
@@ -316,94 +324,96 @@ class Session:
 
     # the robot by hand
 
-    def _by_hand(self) -> None:
+    def _show_by_hand(self) -> None:
         """Show the robot where it was put."""
-        stage = self._stage
-        assert stage is not None
+        shown = self._cell_on_page()
         lies: dict[str, Json] = {
-            name: matrix(stage.cell.station(at).pose)
-            for name, at in stage.places.lying.items()
+            name: matrix(shown.cell.station(at).pose)
+            for name, at in shown.places.lying.items()
             if at
         }
-        q: list[Json] = [round(float(value), 5) for value in stage.q]
-        self._say(hand=True, q=q, held=stage.held, lies=lies, **self._near())
+        q: list[Json] = [round(float(value), 5) for value in shown.q]
+        self._say(hand=True, q=q, held=shown.held, lies=lies, **self._near_values())
 
-    def _near(self) -> dict[str, Json]:
-        stage = self._stage
-        assert stage is not None
-        near = stage.near
-        shown: Json = None
+    def _near_values(self) -> dict[str, Json]:
+        """What is nearest to the robot, whom that blames, and the note."""
+        shown = self._cell_on_page()
+        near = shown.near
+        line: Json = None
         if near is not None:
             points = [round(float(x), 4) for x in (*near.point_a, *near.point_b)]
-            shown = [round(near.distance, 5), *points, near.text]
+            line = [round(near.distance, 5), *points, near.text]
         return {
-            "near": shown,
-            "blamed": list(stage.blamed()),
-            "note": one_line(stage.note, _LINE),
+            "near": line,
+            "blamed": list(shown.blamed()),
+            "note": one_line(shown.note, _LINE),
         }
 
-    def _joints(self, given: list[Any]) -> None:
+    def _stand_at_joints(self, given: list[Any]) -> None:
         """Stand at values in degrees, of a rail in m."""
-        stage = self._stage
-        if stage is None:
+        shown = self._shown_cell
+        if shown is None:
             return
-        robot = stage.cell.robot
+        robot = shown.cell.robot
         if len(given) != robot.n or not all(isinstance(each, int | float) for each in given):
             units = ", ".join(dict.fromkeys(robot.unit(k) for k in range(robot.n)))
             self._say(note=f"the robot has {robot.n} joints: so many numbers ({units}) are needed")
             return
-        stage.note = ""
+        shown.note = ""
         q = robot.from_people_units(np.array(given, dtype=float))
         q = np.clip(q, robot.position_min, robot.position_max)
-        stage.now = stage.cell
-        stage.stand(q)
-        self._by_hand()
+        shown.now = shown.cell
+        shown.stand(q)
+        self._show_by_hand()
 
-    def _at(self, name: str) -> None:
-        stage = self._stage
-        if stage is None:
+    def _stand_at_place(self, name: str) -> None:
+        """Stand in a posture, or at a station."""
+        shown = self._shown_cell
+        if shown is None:
             return
-        stage.note = ""
-        stage.now = stage.cell
-        q = stage.configuration(name)
+        shown.note = ""
+        shown.now = shown.cell
+        q = shown.configuration(name)
         if q is None:
-            self._say(note=one_line(stage.note, _LINE))
+            self._say(note=one_line(shown.note, _LINE))
             return
-        stage.stand(q)
-        stage.note = f"robot at {name}"
-        self._by_hand()
+        shown.stand(q)
+        shown.note = f"robot at {name}"
+        self._show_by_hand()
 
     # the motion
 
-    def _time(self, at: float) -> None:
+    def _show_time(self, at: float) -> None:
         """What is near at a time [s] of the plan; a recording has that in its scene."""
-        stage = self._stage
+        shown = self._shown_cell
         motion = self._motion
-        if stage is None or motion is None:
+        if shown is None or motion is None:
             self._say(hand=False, note="")
             return
         step = motion.step(float(at))
-        stage.hold(step.load, step.places, step.cell)
-        stage.stand(step.at(float(at)), step.movement)
-        stage.note = f"{step.label}, {watts(motion.watts(float(at)))}"
-        self._say(hand=False, nearNow=True, **self._near())
+        shown.hold(step.load, step.places, step.cell)
+        shown.stand(step.at(float(at)), step.movement)
+        shown.note = f"{step.label}, {watts(motion.watts(float(at)))}"
+        self._say(hand=False, nearNow=True, **self._near_values())
 
     def _replay(self, _: bool) -> None:
         """Show the recorded motion again."""
-        shown = self._shown
-        stage = self._stage
-        if not isinstance(shown, Recorded) or stage is None:
+        source = self._source
+        shown = self._shown_cell
+        if not isinstance(source, Recorded) or shown is None:
             return
-        analysis = shown.analysis
+        analysis = source.analysis
         known = np.isfinite(analysis.safety_distance)
         content = page_content(analysis, analysis.safety_distance if known else MARGIN)
         self._motion = None
-        self._draw(recorded_content(content, stage.cell))
+        self._draw(recorded_content(content, shown.cell))
         recording = analysis.recording
         driven = driven_tiles(analysis)
+        # the other notes of the first tile, energy, are a line below
+        notes = [driven[0].notes[:1], *(tile.notes for tile in driven[1:])]
         tiles: list[Json] = [
-            [tile.name, tile.value, "; ".join(filter(None, tile.notes[: None if k else 1]))]
-            for k, tile in enumerate(driven)
+            [tile.name, tile.value, "; ".join(filter(None, kept))]
+            for tile, kept in zip(driven, notes, strict=True)
         ]
         kind = "Simulated, not measured" if recording.origin == "simulated" else "Measured"
         said = "The recording as it was driven."
@@ -424,37 +434,37 @@ class Session:
 
     # machines and stations by hand
 
-    def _move(self, words: list[Any]) -> None:
-        stage = self._stage
+    def _move_target(self, words: list[Any]) -> None:
+        """Move a machine or a station; words: its name, and the numbers of its pose."""
+        shown = self._shown_cell
         file = self._file
-        if stage is None or file is None:
+        if shown is None or file is None:
             return
         name = str(words[0]) if words else ""
-        target = next((each for each in targets(stage.cell) if each.text == name), None)
+        target = next((each for each in targets(shown.cell) if each.text == name), None)
         if target is None:
             self._say(note=f"{name[:60]!r} is no machine or station of this cell")
             return
         try:
-            pose = moved_pose(target, pose_of_numbers(words[1:]), stage.cell, file)
+            pose = moved_pose(target, pose_of_numbers(words[1:]), shown.cell, file)
             moves = {**self._moves, target: pose}
             cell = cell_with(file, moves)
         except (DescriptionError, InvalidValueError, TypeError, ValueError) as error:
             self._say(note=one_line(f"{name} can't stand there: {error}", _LINE))
             return
-        self._take(cell, moves, target)
+        self._show_moves(cell, moves, target)
 
-    def _take(
+    def _show_moves(
         self, cell: Cell, moves: dict[DragTarget, FloatArray], target: DragTarget | None
     ) -> None:
         """Show and plan the cell with these moves; target: what moved last."""
-        stage = self._stage
-        assert stage is not None
+        shown = self._cell_on_page()
         self._moves = moves
         self._motion = None
-        stage.move(cell)
-        stage.stand(stage.q)
-        self._say(stations=[], tiles=[], compared="", **self._standing())
-        self._by_hand()
+        shown.move(cell)
+        shown.stand(shown.q)
+        self._say(stations=[], tiles=[], compared="", **self._standing_values())
+        self._show_by_hand()
         first = [
             station.name
             for station in cell.stations
@@ -464,13 +474,13 @@ class Session:
 
     def _undo(self, _: bool) -> None:
         if self._file is not None:
-            self._take(self._file, {}, None)
+            self._show_moves(self._file, {}, None)
 
     def _save(self, _: bool) -> None:
         if self._file is None or not self._moves:
             return
         try:
-            note = f"written: {save(self._shown, self._file, self._moves)}"
+            note = f"written: {save(self._source, self._file, self._moves)}"
         except CommandError as error:
             note = f"nothing was written: {error}"
         self._say(note=one_line(note, _LINE))
@@ -485,21 +495,21 @@ class Session:
         plan: bool = True,
         compare: bool = False,
     ) -> None:
-        stage = self._stage
-        if stage is None:
+        shown = self._shown_cell
+        if shown is None:
             return
         self._number += 1
         if plan:
-            self._planning("comparing …" if compare else "planning …", 0.0)
+            self._say_planning("comparing …" if compare else "planning …", 0.0)
         asked = ViewRequest(
-            self._number, stage.cell, first, self._stations, quiet, plan=plan, compare=compare
+            self._number, shown.cell, first, self._stations, quiet, plan=plan, compare=compare
         )
         self._worker.ask(asked)
 
     def _compare(self, _: bool) -> None:
         self._ask(compare=True)
 
-    def _planning(self, words: str, share: float) -> None:
+    def _say_planning(self, words: str, share: float) -> None:
         self._say(plan={"state": "planning", "lines": [words], "share": round(share, 2)})
 
     def _cancel(self, _: bool) -> None:
@@ -507,23 +517,23 @@ class Session:
         self._number += 1
         self._say(plan={"state": "cancelled", "lines": ["planning was cancelled"], "share": 0.0})
 
-    def _checked(self, number: int, found: tuple[StationAccess, ...], complete: bool) -> None:
-        stage = self._stage
-        if number != self._number or stage is None:
+    def _show_access(self, number: int, found: tuple[StationAccess, ...], complete: bool) -> None:
+        shown = self._shown_cell
+        if number != self._number or shown is None:
             return
-        stage.found = found
+        shown.found = found
         rows: list[Json] = [_access(each) for each in found]
-        self._say(stations=rows, checked=complete, blamed=list(stage.blamed()))
+        self._say(stations=rows, checked=complete, blamed=list(shown.blamed()))
 
-    def _progress(self, number: int, phase: str, done: int, total: int) -> None:
+    def _show_progress(self, number: int, phase: str, done: int, total: int) -> None:
         if number == self._number:
-            self._planning(f"planning: {phase} {done} of {total}", done / max(total, 1))
+            self._say_planning(f"planning: {phase} {done} of {total}", done / max(total, 1))
 
-    def _planned(self, number: int, plan: Planned) -> None:
-        stage = self._stage
-        if number != self._number or stage is None:
+    def _show_plan(self, number: int, plan: Planned) -> None:
+        shown = self._shown_cell
+        if number != self._number or shown is None:
             return
-        stage.failure = plan.failure
+        shown.failure = plan.failure
         if plan.compared:
             lines: list[Json] = ["compared: the figures stand below"]
             self._say(
@@ -540,12 +550,12 @@ class Session:
             lines = ["the cell has neither program nor tasks: nothing was planned"]
         self._motion = plan.motion
         if plan.motion is not None:
-            self._draw(planned_content(plan.motion.side, stage.cell))
+            self._draw(planned_content(plan.motion.side, shown.cell))
             self._say(hand=False, near=None, note="", origin=PREDICTED)
         tiles = _tiles(plan.report) if plan.report is not None else []
         self._say(
             tiles=tiles,
-            blamed=list(stage.blamed()),
+            blamed=list(shown.blamed()),
             plan={"state": state, "lines": lines, "share": 1.0},
         )
 

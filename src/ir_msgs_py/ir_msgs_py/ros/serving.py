@@ -45,12 +45,11 @@ from ir_msgs_py.ros.topics import REQUESTS_WAITING, SERVICE, PolledGroup
 from ir_msgs_py.status import Status, StatusCode
 
 MOST_BYTES = 2 * 2**20
-"""Of a request or an answer: the points of forty movements. What the middleware keeps for a
-recorder that is busy is at most WAITING of these twice.
-"""
-MOST_WAITING = 64 * 2**20
+"""Of a request or an answer in a recording: the points of forty movements."""
+CALLS_KEPT = 100
+"""Calls that the middleware keeps for a busy recorder: each is a request and an answer."""
+BYTES_WAITING = 64 * 2**20
 """Bytes of the requests of a service that wait together; the first is taken whatever its size."""
-WAITING = 100
 LOOK = 0.05
 """s between two looks whether a client is still there: each takes a third of a millisecond."""
 _TAKEN_KEPT = 1000  # goals
@@ -76,7 +75,7 @@ class Calls:
         self._clock = node.get_clock()
         self._name = node.get_fully_qualified_name()
         self._publisher = node.create_publisher(
-            RecordedCall, f"~/{names.CALLS}", QoSProfile(depth=WAITING)
+            RecordedCall, f"~/{names.CALLS}", QoSProfile(depth=CALLS_KEPT)
         )
 
     @classmethod
@@ -94,7 +93,7 @@ class Calls:
         stamp = self._clock.now().to_msg()
         data = _bounded(request) if self._publisher.get_subscription_count() else None
 
-        def answered(response: Any) -> None:
+        def publish_answer(response: Any) -> None:
             if not self._publisher.get_subscription_count():
                 return
             call = RecordedCall(node=self._name, service=name, type=kind)
@@ -103,17 +102,17 @@ class Calls:
             call.response = _bounded(response)
             self._publisher.publish(call)
 
-        return answered
+        return publish_answer
 
 
 def _bounded(message: Any) -> array.array[int]:
     """The message's CDR; nothing where it is longer than MOST_BYTES."""
-    data = serialize_message(message) if _left(message, MOST_BYTES) >= 0 else b""
+    data = serialize_message(message) if _bytes_left(message, MOST_BYTES) >= 0 else b""
     return array.array("B", data if len(data) <= MOST_BYTES else b"")
 
 
 class RequestQueue:
-    """Requests of the service `name` that wait, at most `most` and MOST_WAITING bytes together."""
+    """Requests of the service `name` that wait, at most `most` and BYTES_WAITING together."""
 
     def __init__(self, name: str, most: int = REQUESTS_WAITING) -> None:
         self._name = name
@@ -126,13 +125,13 @@ class RequestQueue:
 
     def add(self, request: Any, entry: Callable[[], Any]) -> str:
         """Let an entry wait for a request, made by `entry`; why it may not, "" where it does."""
-        left = _left(request, MOST_WAITING)
-        size = MOST_WAITING - left
+        left = _bytes_left(request, BYTES_WAITING)
+        size = BYTES_WAITING - left
         if len(self) >= self._most:
             return f"{self._most} requests of {self._name} are waiting: send fewer at once"
-        if self._entries and self._bytes + size > MOST_WAITING:
+        if self._entries and self._bytes + size > BYTES_WAITING:
             return (
-                f"requests of {self._name} that wait would take more than {MOST_WAITING >> 20} "
+                f"requests of {self._name} that wait would take more than {BYTES_WAITING >> 20} "
                 "MiB: send fewer at once"
             )
         self._entries.append((entry(), size))
@@ -146,7 +145,7 @@ class RequestQueue:
         return entry
 
 
-def _left(value: Any, left: int) -> int:
+def _bytes_left(value: Any, left: int) -> int:
     """How many of `left` bytes a value leaves, about; it ends as soon as none are left."""
     if left < 0:
         return left
@@ -156,13 +155,15 @@ def _left(value: Any, left: int) -> int:
         return left - len(value) * value.itemsize
     if hasattr(value, "nbytes"):
         return left - int(value.nbytes)
-    for part in _parts(value):
-        if (left := _left(part, left)) < 0:
+    for part in _fields_or_items(value):
+        left = _bytes_left(part, left)
+        if left < 0:
             return left
     return left - _NUMBER
 
 
-def _parts(value: Any) -> Iterable[Any]:
+def _fields_or_items(value: Any) -> Iterable[Any]:
+    """What a message or a collection is made of; nothing of any other value."""
     if hasattr(value, "get_fields_and_field_types"):
         return (getattr(value, name) for name in value.get_fields_and_field_types())
     return value if isinstance(value, list | tuple | set) else ()
@@ -211,7 +212,7 @@ def with_status(response: Any, status: Status) -> None:
 
 
 class BoundedService(Waitable):
-    """A service of `node`; at most `waiting` requests wait in it, and MOST_WAITING bytes.
+    """A service of `node`; at most `most_waiting` requests wait in it, and BYTES_WAITING.
 
     put: puts a status into a response, where that has no `status` of ours.
     handler: from request and response to the response; requests are answered in the order in which
@@ -228,7 +229,7 @@ class BoundedService(Waitable):
         name: str,
         handler: Handler,
         group: CallbackGroup | None = None,
-        waiting: int = REQUESTS_WAITING,
+        most_waiting: int = REQUESTS_WAITING,
         put: Callable[[Any, Status], None] = with_status,
         *,
         watching: bool = False,
@@ -256,7 +257,7 @@ class BoundedService(Waitable):
             return
         self._calls.services.add(self._service)
         self._more = node.create_guard_condition(_nothing, callback_group=untouched)
-        self._waiting = RequestQueue(self._service.service_name, waiting)
+        self._queue = RequestQueue(self._service.service_name, most_waiting)
         self._index = 0
         node.add_waitable(self)
 
@@ -276,21 +277,21 @@ class BoundedService(Waitable):
         """Wait for a request."""
         self._index = wait_set.add_service(self._service.handle)
         wait_set.add_guard_condition(self._more.handle)
-        if self._waiting:
+        if self._queue:
             self._more.trigger()
 
     def is_ready(self, wait_set: Any) -> bool:
         """Whether a request has come or waits."""
-        return bool(self._waiting) or bool(wait_set.is_ready("service", self._index))
+        return bool(self._queue) or bool(wait_set.is_ready("service", self._index))
 
     def take_data(self) -> tuple[Any, Any, tuple[Gone, ...]] | None:
         """Take all that have come; the one to be answered now."""
         while True:
             taken = take_request(self._service)
             if taken is None:
-                return self._waiting.pop() if self._waiting else None
+                return self._queue.pop() if self._queue else None
             request, header = taken
-            refusal = self._waiting.add(request, partial(self._watched, request, header))
+            refusal = self._queue.add(request, partial(self._watched, request, header))
             if refusal:
                 self._send(self._response(Status(StatusCode.FAILURE, refusal)), header)
 
@@ -313,9 +314,10 @@ class BoundedService(Waitable):
     def _answer(self, request: Any, response: Any, *watch: Gone) -> Any:
         """The handler's response, or that of what it raises."""
         try:
-            answered = self._calls.taken(self._service.service_name, type_name(self._type), request)
+            kind = type_name(self._type)
+            publish_answer = self._calls.taken(self._service.service_name, kind, request)
             response = self._handler(request, response, *watch)
-            answered(response)
+            publish_answer(response)
         except ANY as error:
             self._log(traceback.format_exc())
             response = self._response(unexpected(error))
@@ -411,9 +413,9 @@ class RecordedActionServer(PatientActionServer):
         """The callback, and around it what a recording needs."""
 
         async def execute(goal: Any) -> Any:
-            answered = self._calls.taken(self._full_name, self._type_text, goal.request)
+            publish_answer = self._calls.taken(self._full_name, self._type_text, goal.request)
             result = await await_or_execute(execute_callback, goal)
-            answered(result)
+            publish_answer(result)
             forget_request(goal)
             return result
 

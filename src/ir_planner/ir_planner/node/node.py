@@ -105,12 +105,12 @@ class PlannerNode(Node):
             planner=self.planner,
             last_state=self._last_state,
             now=time.monotonic,
-            cell_changed=self._show_cell,
-            planned=self._show_movement,
+            on_cell_changed=self._show_cell,
+            on_planned=self._show_movement,
             draw_seed=lambda: random.SystemRandom().getrandbits(64),
             log=self.get_logger().error,
-            service_planned=self._show_service,
-            program_saves=self._show_savings,
+            on_service_planned=self._show_service,
+            on_program_saves=self._show_savings,
         )
         self._trajectories = self.create_publisher(
             JointTrajectoryMsg, own(names.PLANNED_TRAJECTORY), LATCHED

@@ -112,10 +112,10 @@ def refused(error: Exception) -> Status:
 class Requests:
     """Handlers of the planner's services; those that plan also take whether they are cancelled.
 
-    now: the node's clock [s]. cell_changed and planned: called after the cell changed or a
-    trajectory was planned; service_planned: the same for the candidates at a station,
-    program_saves: for the savings of a program. draw_seed: for random_seed. log: takes what nobody
-    expected.
+    now: the node's clock [s]. on_cell_changed and on_planned: called after the cell changed or a
+    trajectory was planned; on_service_planned: the same for the candidates at a station,
+    on_program_saves: for the savings of a program. draw_seed: for random_seed. log: takes what
+    nobody expected.
     """
 
     def __init__(
@@ -126,20 +126,20 @@ class Requests:
         now: Callable[[], float],
         draw_seed: Callable[[], int],
         log: Callable[[str], None],
-        cell_changed: Callable[[], None] = lambda: None,
-        planned: Callable[[JointTrajectory], None] = lambda trajectory: None,
-        service_planned: Callable[[str, ServicePlan], None] = lambda station, plan: None,
-        program_saves: Callable[[ProgramSavings], None] = lambda savings: None,
+        on_cell_changed: Callable[[], None] = lambda: None,
+        on_planned: Callable[[JointTrajectory], None] = lambda trajectory: None,
+        on_service_planned: Callable[[str, ServicePlan], None] = lambda station, plan: None,
+        on_program_saves: Callable[[ProgramSavings], None] = lambda savings: None,
     ) -> None:
         self.planner = planner
         self.last_state = last_state
         self.now = now
-        self.cell_changed = cell_changed
-        self.planned = planned
+        self.on_cell_changed = on_cell_changed
+        self.on_planned = on_planned
         self.log = log
         self.draw_seed = draw_seed
-        self.service_planned = service_planned
-        self.program_saves = program_saves
+        self.on_service_planned = on_service_planned
+        self.on_program_saves = on_program_saves
 
     def guarded(self, handler: Callable[..., Status]) -> Callable[..., Any]:
         """The handler as a service callback: its status goes into the response, whatever
@@ -159,7 +159,7 @@ class Requests:
         cell = self.planner.set_cell(self._inside(request.cell_file), text=request.cell_yaml)
         response.cell_name = cell.name
         response.stations = stations_to_msg(cell)
-        self.cell_changed()
+        self.on_cell_changed()
         return Status.success()
 
     def get_cell(self, request: GetCell.Request, response: GetCell.Response) -> Status:
@@ -178,7 +178,7 @@ class Requests:
         self.planner.set_equipment(
             request.name, pose=pose, enabled=request.enabled, state=request.state
         )
-        self.cell_changed()
+        self.on_cell_changed()
         return Status.success()
 
     def check_state(self, request: CheckState.Request, response: CheckState.Response) -> Status:
@@ -271,7 +271,7 @@ class Requests:
             start, station=request.station, options=options, cancelled=cancelled
         )
         fill_escape(response, plan, options.include_points)
-        return self._shown(plan)
+        return self._publish_and_status(plan)
 
     def plan_service(
         self,
@@ -296,7 +296,7 @@ class Requests:
         )
         fill_service(response, plan, options.include_points)
         if plan.candidates:
-            self.service_planned(request.station, plan)
+            self.on_service_planned(request.station, plan)
         return plan.status
 
     def plan_trajectory(
@@ -332,7 +332,7 @@ class Requests:
             cancelled=cancelled,
         )
         fill_cartesian(response, plan, options.include_points)
-        return self._shown(plan)
+        return self._publish_and_status(plan)
 
     def optimize_trajectory(
         self,
@@ -346,15 +346,16 @@ class Requests:
             trajectory_of(request, self.planner), options=options, cancelled=cancelled
         )
         fill_optimization(response, plan, options.include_points)
-        return self._shown(plan)
+        return self._publish_and_status(plan)
 
     def _movement(self, plan: Any, response: Any, include_points: bool) -> Status:
         fill_movement(response, plan, include_points)
-        return self._shown(plan)
+        return self._publish_and_status(plan)
 
-    def _shown(self, plan: Any) -> Status:
+    def _publish_and_status(self, plan: Any) -> Status:
+        """Publish a trajectory that was planned; the status of its request."""
         if plan.trajectory is not None:
-            self.planned(plan.trajectory)
+            self.on_planned(plan.trajectory)
         status: Status = plan.status
         return status
 
@@ -380,10 +381,10 @@ class Requests:
         )
         fill_program(response, plan, options.include_points)
         if plan.savings.available:
-            self.program_saves(plan.savings)
+            self.on_program_saves(plan.savings)
         for movement in plan.movements:
             if movement.trajectory is not None:
-                self.planned(movement.trajectory)
+                self.on_planned(movement.trajectory)
         return plan.status
 
     def plan_steady_cycle(

@@ -49,7 +49,8 @@ def load_timeline(recording: Recording) -> LoadTimeline:
         if event.event == STARTED and event.movement.load:
             steps.append((event.time, load))
         elif event.event == "ended" and event.movement.load:
-            steps.append((event.time, after(load, event.movement.attach, event.movement.detach)))
+            carried_on = load_after(load, event.movement.attach, event.movement.detach)
+            steps.append((event.time, carried_on))
     reported = [(event.time, normal(event.text)) for event in recording.loads]
     if steps:
         first = steps[0][0]
@@ -68,20 +69,20 @@ def _sharpened(reported: list[tuple[float, str]], power: PowerSeries) -> list[tu
         (np.abs(np.diff(power.base_power)) > TOOL_STEP) & (np.diff(power.mode) == 0)
     )
     before_jumps = power.time[jumps]
-    behind_jumps = power.time[jumps + 1]
+    after_jumps = power.time[jumps + 1]
     result: list[tuple[float, str]] = []
     for time, load in reported:
         if result and result[-1][1] != load:
             start = result[-1][0] - STALE
             first = int(np.searchsorted(before_jumps, start, "right"))
-            end = int(np.searchsorted(behind_jumps, time, "right"))
+            end = int(np.searchsorted(after_jumps, time, "right"))
             if first < end:
                 before = float(before_jumps[first])
-                behind = float(behind_jumps[end - 1])
+                after = float(after_jumps[end - 1])
                 old = result[-1][1]
                 while result and result[-1][0] > before and result[-1][1] == old:
                     result.pop()
-                result += [(before, old), (behind, load)]
+                result += [(before, old), (after, load)]
         result.append((time, load))
     return result
 
@@ -105,7 +106,7 @@ def normal(load: str) -> str:
     return load or NO_LOAD
 
 
-def after(load: str, attach: str, detach: str) -> str:
+def load_after(load: str, attach: str, detach: str) -> str:
     """The load text after a step's attaching and detaching."""
     names = [name for name in load.split(LOAD_SEPARATOR) if name and name not in (NO_LOAD, detach)]
     if attach and attach not in names:

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from ir_msgs_py.stop_numbers import stop_count
 from ir_sim_driver.controller.goal_checks import VettedGoal
@@ -36,6 +37,22 @@ class _Waiting:
     number: int
     ended: Ended | None = None
     canceled: bool = False
+
+
+class _StopState(NamedTuple):
+    """Number of the last stop, and whether it is latched."""
+
+    number: int
+    latched: bool
+
+
+class Recovery(NamedTuple):
+    """Number of the last stop that was recovered, and when [ns of the system's clock]; at 0 none
+    came yet.
+    """
+
+    number: int
+    at: int
 
 
 class TrajectoryQueue:
@@ -161,34 +178,32 @@ class Goals:
         self._queue = TrajectoryQueue()
         self._wall = wall
         self._stop_seen = simulation.stop_number
-        self._heeded = simulation.stop_number, simulation.stopped
-        self._recovery = simulation.stop_number, 0
-        self._running: dict[int, int] = {}  # ids of started goals by ticket
-        self._waiting: dict[int, tuple[int, Ended]] = {}  # tickets and senders by id
+        self._heeded = _StopState(simulation.stop_number, simulation.stopped)
+        self._recovery = Recovery(simulation.stop_number, 0)
+        self._started_ids: dict[int, int] = {}  # ids of started goals by ticket
+        self._senders: dict[int, tuple[int, Ended]] = {}  # tickets and senders of these by id
 
     def close(self) -> None:
         """Stop checking."""
         self._checker.shutdown(wait=True, cancel_futures=True)
 
     @property
-    def recovery(self) -> tuple[int, int]:
-        """Number of the last stop that was recovered and when [ns of the system's clock]; at 0
-        none came yet.
-        """
+    def recovery(self) -> Recovery:
+        """The last recovery."""
         return self._recovery
 
     def heed_stop(self) -> None:
         """Note when a stop was recovered; what was sent before that starts nothing. The lock is
         held.
         """
-        present = self._simulation.stop_number, self._simulation.stopped
-        number, recovered = self._recovery
+        present = _StopState(self._simulation.stop_number, self._simulation.stopped)
+        last = self._recovery
         if present != self._heeded:
             self._heeded = present
-            if not self._simulation.stopped:
-                self._recovery = self._simulation.stop_number, self._wall()
-        elif recovered:  # a clock that was set back must not refuse until it is there again
-            self._recovery = number, min(recovered, self._wall())
+            if not present.latched:
+                self._recovery = Recovery(present.number, self._wall())
+        elif last.at:  # a clock that was set back must not refuse until it is there again
+            self._recovery = Recovery(last.number, min(last.at, self._wall()))
 
     def admit(self, points: int, size: int = 0, sent: int = 0) -> int:
         """Ticket for a goal of so many points and bytes, taken before it is converted; sent: when
@@ -204,9 +219,9 @@ class Goals:
             if simulation.stopped:
                 raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, simulation.refusal())
             self.heed_stop()
-            number, recovered = self._recovery
-            if 0 < sent < recovered:
-                late = sent_before_recovery(number, recovered - sent)
+            last = self._recovery
+            if 0 < sent < last.at:
+                late = sent_before_recovery(last.number, last.at - sent)
                 raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, late)
             return self._queue.admit(
                 points, size, simulation.stop_number, simulation.settings.execution
@@ -229,8 +244,8 @@ class Goals:
 
     def cancel(self, ticket: int) -> None:
         """Stop a goal along its path, as soon as it has started. The lock is held."""
-        if ticket in self._running:
-            self._simulation.cancel(self._running[ticket])
+        if ticket in self._started_ids:
+            self._simulation.cancel(self._started_ids[ticket])
         else:
             self._queue.cancel(ticket)
 
@@ -243,7 +258,8 @@ class Goals:
     def runs(self, ticket: int) -> bool:
         """Whether this goal is executed now. The lock is held."""
         return (
-            ticket in self._running and self._running[ticket] == self._simulation.executor.goal_id
+            ticket in self._started_ids
+            and self._started_ids[ticket] == self._simulation.executor.goal_id
         )
 
     def take_calls(self, outcomes: Sequence[GoalOutcome]) -> list[tuple[Ended, GoalOutcome]]:
@@ -255,11 +271,11 @@ class Goals:
         if self._stop_seen != self._simulation.stop_number:
             number = self._simulation.stop_number
             self._stop_seen = number
-            ended_now = refused(ended_by_stop(number))
-            calls = [(ended, ended_now) for ended in self._queue.end_before(number)]
+            stopped = refused(ended_by_stop(number))
+            calls = [(sender, stopped) for sender in self._queue.end_before(number)]
         for outcome in outcomes:
-            ticket, sender = self._waiting.pop(outcome.goal_id, (NO_GOAL, None))
-            self._running.pop(ticket, None)
+            ticket, sender = self._senders.pop(outcome.goal_id, (NO_GOAL, None))
+            self._started_ids.pop(ticket, None)
             if sender is not None:
                 calls.append((sender, outcome))
         return calls
@@ -267,9 +283,9 @@ class Goals:
     def drop(self, sentence: str) -> list[tuple[Ended, GoalOutcome]]:
         """End all goals, those that were started and those that were not. The lock is held."""
         self._dead = sentence
-        senders = [*(ended for _, ended in self._waiting.values()), *self._queue.clear()]
-        self._waiting.clear()
-        self._running.clear()
+        senders = [*(ended for _, ended in self._senders.values()), *self._queue.clear()]
+        self._senders.clear()
+        self._started_ids.clear()
         return [(ended, refused(sentence)) for ended in senders]
 
     def _check_and_start(self, ticket: int, read: Read) -> None:
@@ -302,9 +318,9 @@ class Goals:
             goal_id = simulation.execute(vetted, self._now())
         except TrajectoryRefusedError as error:
             return ended, refused(str(error), error.code)
-        self._running[ticket] = goal_id
+        self._started_ids[ticket] = goal_id
         if ended is not None:
-            self._waiting[goal_id] = ticket, ended
+            self._senders[goal_id] = ticket, ended
         if canceled:
             simulation.cancel(goal_id)
         return ended, None

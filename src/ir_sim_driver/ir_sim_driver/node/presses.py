@@ -408,7 +408,7 @@ class PolledService:
 
     owner: in whose name. handler: from request, response, the time at which the request came [ns
     of the monotonic clock] and its client. urgent: whether a request goes before all that wait. At
-    most REQUESTS_WAITING wait, and MOST_WAITING bytes; what comes beyond is refused.
+    most REQUESTS_WAITING wait, and BYTES_WAITING; what comes beyond is refused.
     """
 
     def __init__(

@@ -214,7 +214,7 @@ def first_feasible(info: PlanningInfo) -> float:
 _STARTS = 2  # looks at what it takes to start a process of OMPL, after the first, which loads it
 
 
-def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
+def row_maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
     """Rows of entries, with everything loaded that is loaded once; `read` of the settings: what
     must be the same here. StudyError where it is not.
     """

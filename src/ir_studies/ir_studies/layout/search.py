@@ -209,7 +209,7 @@ _KINDS = {
 }
 
 
-def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
+def row_maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
     """What makes the row of a job. settings: cell_yaml and what LayoutSettings.budget holds."""
     return Maker(settings).row
 

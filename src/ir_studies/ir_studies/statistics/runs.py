@@ -28,8 +28,6 @@ from ir_studies.work import Job, Means, Results, Row, StudyJob
 from ir_studies.work.results import PLANT, digest_of_tasks, refuse_others
 from ir_values.arrays import FloatArray
 
-# Movements of a pair of places: planned in both timings, driven, and measured.
-
 # Places: ends of the withdrawals from the stations, ends of the tasks, and home.
 
 NEAREST = 0.002  # m that a place keeps
@@ -112,10 +110,12 @@ def pair_of(
     return EndPair((first.name, last.name), first.q[i], last.q[j], margin)
 
 
-AROUND = 0.5  # s after a movement that the filter of the indirect measurement may look at
+# Movements of a pair of places: planned in both timings, driven, and measured.
+
+AFTER_MOVEMENT = 0.5  # s after it that the filter of the indirect measurement may look at
 
 
-def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
+def row_maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
     """Rows of pairs by their numbers, with the cell and its places loaded once; `read` of the
     settings: what must be the same here. StudyError where it is not.
     """
@@ -126,17 +126,15 @@ def maker(settings: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], Row]:
     try:
         places = places_of(planner, asked.load)
         why = ""
-    except (
-        StudyError,
-        PlannerError,
-    ) as error:  # a row says so in words, a process that can't start does not
+    except (StudyError, PlannerError) as error:
+        # a row says so in words, a process that can't start does not
         places = ()
         why = str(error)
 
-    def row_of(words: Mapping[str, Any]) -> Row:
+    def row_of(job: Mapping[str, Any]) -> Row:
         if why:
             return {"message": why}
-        number = int(words["number"])
+        number = int(job["number"])
         pair = pair_of(places, asked.seed, number, asked.safety_distance)
         own = replace(asked, plant=asked.plant_of(number))
         row: Row = {"start": pair.names[0], "goal": pair.names[1]}
@@ -167,10 +165,12 @@ def one_timing(pair: EndPair, timing: str, asked: StatisticsSettings, planner: P
         return {"solved": False, "message": str(error)}
     if plan.trajectory is None or not plan.report.certified:
         return {"solved": False, "message": plan.status.message}
-    return _planned(plan) | _driven(plan.trajectory, plan.report.load, asked.plant, planner.cell)
+    driven = _figures_driven(plan.trajectory, plan.report.load, asked.plant, planner.cell)
+    return _figures_of_plan(plan) | driven
 
 
-def _planned(plan: MovementPlan) -> Row:
+def _figures_of_plan(plan: MovementPlan) -> Row:
+    """What the planner says of a certified movement."""
     report = plan.report
     trajectory = plan.trajectory
     return {
@@ -189,7 +189,7 @@ def _planned(plan: MovementPlan) -> Row:
     }
 
 
-def _driven(trajectory: JointTrajectory, load: str, plant: str, cell: Cell) -> Row:
+def _figures_driven(trajectory: JointTrajectory, load: str, plant: str, cell: Cell) -> Row:
     """Joules by meter and by positions, peak power [W]; NaN, with a sentence, where it was not
     driven.
 
@@ -200,8 +200,8 @@ def _driven(trajectory: JointTrajectory, load: str, plant: str, cell: Cell) -> R
         try:
             run.place(np.array(trajectory.positions[0]))
             began, ended = run.drive(trajectory)
-            run.advance(AROUND)
-            return _measured(run, began, ended)
+            run.advance(AFTER_MOVEMENT)
+            return _figures_measured(run, began, ended)
         finally:
             run.close()
     except (DriverError, StudyError) as error:
@@ -213,7 +213,8 @@ def _driven(trajectory: JointTrajectory, load: str, plant: str, cell: Cell) -> R
         }
 
 
-def _measured(run: SimulatedRun, began: float, ended: float) -> Row:
+def _figures_measured(run: SimulatedRun, began: float, ended: float) -> Row:
+    """Joules by meter and by positions and peak power [W] between two times [s] of a run."""
     trace = run.trace()
     cell = run.cell
     energy = trace.columns["energy"]
@@ -278,7 +279,7 @@ def run_statistics(
             for job, row in makers.rows(missing):
                 results.add(job, row)
                 done += 1
-                means.progress(_words(row), done, len(jobs), "")
+                means.progress(_progress_text(row), done, len(jobs), "")
         rows = tuple(results.rows[key] for key in jobs)
         remark = results.remark
     found = findings_of(rows)
@@ -286,7 +287,8 @@ def run_statistics(
     return FinishedStatistics(settings, rows, found, files, remark)
 
 
-def _words(row: Row) -> str:
+def _progress_text(row: Row) -> str:
+    """The pair of a row and whether it moved, for the line that says how far the study is."""
     if "start" not in row:
         return str(row.get("message", "no answer"))
     moved = any(solved(row, timing) for timing in TIMINGS)

@@ -21,15 +21,15 @@ MAKERS = {
     "layout": "ir_studies.layout.search",
     "statistics": "ir_studies.statistics.runs",
 }
-"""Modules by kind of study; each has `maker(settings)`, which loads what is loaded once and returns
-what makes a row from the words of a job.
+"""Modules by kind of study; each has `row_maker(settings)`, which loads what is loaded once and
+returns what makes a row of a job.
 """
 Maker = Callable[[Mapping[str, Any]], Row]
 
 
 def maker_of(kind: str, settings: Mapping[str, Any]) -> Maker:
     """What makes the jobs of a study."""
-    make: Maker = import_module(MAKERS[kind]).maker(settings)
+    make: Maker = import_module(MAKERS[kind]).row_maker(settings)
     return make
 
 
