@@ -13,7 +13,7 @@ from ir_msgs_py.options import PlanOptions
 from ir_planner.checks import FreeSpace
 from ir_planner.program.movements import mapped
 from ir_planner.regional import search_regional
-from ir_planner.regional.safeguards import LATE, with_own_laws
+from ir_planner.regional.companions import LATE, with_own_laws
 from ir_planner.request.context import Context, Journal, Work
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.search import SEARCHES, Ends

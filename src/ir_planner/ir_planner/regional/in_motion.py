@@ -25,8 +25,8 @@ from ir_planner.checks import (
 from ir_planner.curves import extremes
 from ir_planner.errors import RequestError, TimingError
 from ir_planner.optimize import Portfolio, Refinement
+from ir_planner.regional.companions import over_free_steps
 from ir_planner.regional.exploration import Path, Searches, first_paths, improve
-from ir_planner.regional.safeguards import over_free_steps
 from ir_planner.request import Context
 from ir_planner.scene import STILL, torque_use
 from ir_planner.search import Ends

@@ -6,13 +6,21 @@ many homotopy classes descend by gradient, and the cheapest to the best path and
 them, certified. Nothing found is an answer too: which pair blocks, where, by how much, and what was
 tried.
 
-One direction, each calls those below it:
+One direction, each calls those below it. `Planner.plan_regional` begins at the top; programs, via
+points and given trajectories, which have their configurations, begin at `search_regional`:
 
-    search_regional          this module: the request, its ends, the refusal
-    └── best_found           safeguards: the request's own run, and companions that ask otherwise
-        └── improve          exploration: one run, paths of more homotopy classes turn by turn
-            └── Portfolio    optimize: the paths of a run, the cheapest refined
-                └── Refinement    optimize: one path, the descent to a certified movement
+    plan_to_goal                         a configuration, or all free ones at a pose
+    └── plan_to_configurations           the ends within limits; the answer as a MovementPlan
+        └── search_regional              bound of the tilt, ends in motion, the torque reserve
+            └── _by_timing               synchronous first, then each joint with a law of its own
+                └── _synchronous         blocked ends, the free paths, the refusal
+                    ├── _free_paths      the first free paths, or a proof that there are none
+                    │   └── first_paths              exploration: one search after another
+                    └── _first_that_is_certified     optimised, along a segment, in straight steps
+                        └── best_found               companions: the own run, and those beside it
+                            └── improve              exploration: one run, turn by turn
+                                └── Portfolio        optimize: its paths, the cheapest refined
+                                    └── Refinement   optimize: one path to a certified movement
 """
 
 from dataclasses import dataclass
@@ -29,10 +37,7 @@ from ir_planner.configurations import free_configurations, no_configuration
 from ir_planner.errors import RequestError
 from ir_planner.optimize import Portfolio, Refinement
 from ir_planner.presentation import in_mm, plot_trajectory, result_text
-from ir_planner.regional.exploration import Path, Searches, first_paths, heeds_the_tilt
-from ir_planner.regional.in_motion import search_in_motion
-from ir_planner.regional.no_path import barrier, enclosure
-from ir_planner.regional.safeguards import (
+from ir_planner.regional.companions import (
     DIRECT,
     Answer,
     Exploration,
@@ -42,6 +47,9 @@ from ir_planner.regional.safeguards import (
     slowed_where_fast,
     with_own_laws,
 )
+from ir_planner.regional.exploration import Path, Searches, first_paths, heeds_the_tilt
+from ir_planner.regional.in_motion import search_in_motion
+from ir_planner.regional.no_path import barrier, enclosure
 from ir_planner.request import Context, Goal, Journal, within_limits
 from ir_planner.scene import STILL, path_cost
 from ir_planner.search import Ends, fewest_corners, keeps_upright, pulled
@@ -168,11 +176,11 @@ def search_regional(
     _check_search(context, searches)
     if context.motion is not None:
         return search_in_motion(start, np.atleast_2d(goals), context, searches)
-    status, movement = _search_timed(start, goals, context, searches)
+    status, movement = _by_timing(start, goals, context, searches)
     if movement is None and TOO_HEAVY in status.message:
         lines = [(np.asarray(start), goal) for goal in np.atleast_2d(goals)]
         for eased in with_less_reserve(lines, context):
-            status, movement = _search_timed(start, goals, eased, searches)
+            status, movement = _by_timing(start, goals, eased, searches)
             if movement is not None:
                 break
     return status, movement
@@ -191,17 +199,19 @@ def _check_search(context: Context, searches: Searches) -> None:
     )
 
 
-def _search_timed(
+def _by_timing(
     start: FloatArray, goals: FloatArray, context: Context, searches: Searches
 ) -> tuple[Status, Movement | None]:
-    """The same with the torque that the context's reserve leaves."""
+    """The best movement found within the context's torque reserve: synchronous, or each joint with
+    a law of its own where that is asked for and serves better.
+    """
     if context.options.timing != "asynchronous":
-        return _search(start, goals, context, searches)
-    status, movement = _search(start, goals, context.with_timing("synchronous"), searches)
+        return _synchronous(start, goals, context, searches)
+    status, movement = _synchronous(start, goals, context.with_timing("synchronous"), searches)
     return status, None if movement is None else with_own_laws(movement, context)
 
 
-def _search(
+def _synchronous(
     start: FloatArray, goals: FloatArray, context: Context, searches: Searches
 ) -> tuple[Status, Movement | None]:
     """The best synchronous movement found."""
@@ -215,7 +225,7 @@ def _search(
     paths = _free_paths(ends, space, context, searches)
     if isinstance(paths, Status):
         return paths, None
-    best = _cheapest(Exploration(ends, paths, space, searches), context)
+    best = _first_that_is_certified(Exploration(ends, paths, space, searches), context)
     if best is None:
         return refusal(start, ends.goals[0], space, context.journal, path=True), None
     context.journal.planner_id, movement = best
@@ -238,9 +248,9 @@ def _free_paths(
     return paths or refusal(ends.start, ends.goals[0], space, context.journal, path=False)
 
 
-def _cheapest(exploration: Exploration, context: Context) -> Answer | None:
-    """The cheapest movement that the paths lead to: optimised, along a straight segment, or in
-    straight steps, in this order of what is found. None where none is certified.
+def _first_that_is_certified(exploration: Exploration, context: Context) -> Answer | None:
+    """The movement that the paths lead to: the best of the optimised ones and of the straight
+    segment; where none of these is certified, straight steps. None where these are not either.
     """
     ends = exploration.ends
     planner_id = context.options.planner_id

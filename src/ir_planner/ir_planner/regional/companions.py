@@ -1,10 +1,10 @@
-"""Comparisons before an answer is given, so that no other request would have found a better one.
+"""Companions of a request: further runs that ask for something else, compared with its own run.
 
-The descents of a request may end in a local minimum that another question leaves: movements of
-least W have few turns, those of a high price of time come from smoother descents, and some of both
-are faster than what the descent for time ends in. So companions are run beside a request, and the
-cheapest of all is its answer. The baseline movement is a candidate of every answer of the default
-portfolio.
+A descent ends in a local minimum, and in which depends on what it is asked for. Movements of least
+W have few turns; those of a high price of time come from smoother descents; some of both are faster
+than what the descent for time ends in. So companions run beside a request, and its answer is the
+cheapest movement of all runs: no other request would have found a better one. The default portfolio
+compares the baseline movement too.
 
 | objective | companions of a free duration |
 | --- | --- |
@@ -13,8 +13,12 @@ portfolio.
 | energy | none; faster and slower movements near its own answer |
 | time_and_energy | none |
 
-A requested duration is met by the request's own descents; where these leave a doubt, by the answer
-for J near their paths, else by the fastest with all companions of `time`; both stretched.
+A requested duration is met in three attempts, the later ones only where the earlier ones may have
+missed a cheaper movement:
+
+1. the request's own descents;
+2. the answer for J near their paths, stretched to the duration;
+3. the fastest answer, with all companions of `time`, stretched to the duration.
 """
 
 from collections.abc import Callable, Iterator, Mapping
