@@ -8,8 +8,7 @@ clearance is proved; a pair that comes too near gets a larger clearance margin, 
 continues.
 """
 
-import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,6 +20,7 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import TILT, Violation
 from ir_planner.curves import UniformSpline, along_motion, along_path, fewest_seconds
 from ir_planner.optimize.spline_cost import beyond_limits, slowed_to_limits, spline_cost
+from ir_planner.optimize.within_duration import within_duration
 from ir_planner.request import Context
 from ir_planner.scene import PROOF_TOLERANCE, MotionLimits, tcp_inside
 from ir_planner.search import at_nine_shares
@@ -122,46 +122,7 @@ EXACT = Effort(
 )
 
 
-# Little energy in a requested duration that is so short that a descent at the duration itself ends
-# beyond the limits. A descent of free duration always ends within the limits, because its result is
-# slowed down to them: from the fastest movement on, a second is worth less from step to step, until
-# the movement needs all of the time.
-
-Near = Callable[[Movement, Context], Movement | None]  # by descent from a known movement
-# W: what a second is worth at first, and by how much less or more then
-_FIRST = 32.0  # times the price of a second
-_STEP = 4.0
-_DESCENTS = 5
-_ENOUGH = 0.985  # of the duration: slower would save little more than stretching does
-
-
-def within_duration(fastest: Movement, context: Context, near: Near) -> Movement | None:
-    """The cheapest movement found that takes the duration which the context requests, from one that
-    takes at most as long; None where none is certified.
-    """
-    requested = context.options.duration
-    best = None
-    nearest = fastest
-    value = _FIRST * context.scene.cell.robot.time_value
-    late = 0.0
-    early = 0.0
-    for _ in range(_DESCENTS):
-        priced = replace(context.asking("time_and_energy").options, time_value=value)
-        movement = near(nearest, replace(context, options=priced))
-        duration = movement.trajectory.duration if movement is not None else float("inf")
-        if movement is None or duration > requested * (1.0 + DURATION_SLACK):
-            late = value
-        else:
-            nearest = movement
-            early = value
-            slower = replace(movement, context=context).stretched_by(max(requested / duration, 1.0))
-            if slower.prove().certified and (best is None or slower.cost < best.cost):
-                best = slower
-            if duration > _ENOUGH * requested:
-                break
-        value = math.sqrt(late * early) if late and early else (_STEP * late or early / _STEP)
-    return best
-
+# The descents of one request: coarse solutions, their refinement, and repairs until it is proved.
 
 SPACING = 0.1  # s between the knots of the coarsest spline
 # control points of the coarsest spline
