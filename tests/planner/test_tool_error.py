@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from ir_msgs_py.cartesian import CartesianPath, CartesianSegment
 from ir_planner import Planner
-from ir_planner.cartesian.path_parts import (
+from ir_planner.cartesian.orientations import (
     Evenly,
     RotationRates,
     ThroughPoses,

@@ -15,7 +15,7 @@ from ir_msgs_py.cartesian import CartesianPath, CartesianSegment
 from ir_msgs_py.options import PlanOptions
 from ir_planner import CartesianPlan, Planner
 from ir_planner.cartesian.chains import Layers, turned_into_limits, with_all_turns
-from ir_planner.cartesian.path_parts import about_tool
+from ir_planner.cartesian.orientations import about_tool
 from ir_planner.scene import PlanningScene
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # random paths

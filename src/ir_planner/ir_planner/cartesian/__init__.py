@@ -2,7 +2,7 @@
 angle.
 """
 
-from ir_planner.cartesian.path_parts import Arc, Line, arc_through
+from ir_planner.cartesian.place_curves import Arc, Line, arc_through
 from ir_planner.cartesian.plan import (
     CartesianPlan,
     checked_path_options,

@@ -7,7 +7,7 @@ import numpy as np
 
 from ir_kernels import portable
 from ir_msgs_py.status import StatusCode
-from ir_planner.cartesian.path_parts import about_tool
+from ir_planner.cartesian.orientations import about_tool
 from ir_planner.cartesian.tool_path import NoChainError, PathRefusedError, ToolPath
 from ir_planner.checks import FreeSpace, pair_value
 from ir_planner.presentation import in_mm

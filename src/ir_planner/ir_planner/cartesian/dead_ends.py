@@ -19,7 +19,7 @@ from ir_planner.cartesian.chains import (
     with_all_turns,
 )
 from ir_planner.cartesian.joint_curve import singularity
-from ir_planner.cartesian.path_parts import about_tool
+from ir_planner.cartesian.orientations import about_tool
 from ir_planner.cartesian.tool_path import NoChainError, PathRefusedError, ToolPathRequest
 from ir_planner.scene import PlanningScene
 from ir_values.arrays import BoolArray, FloatArray, IntArray

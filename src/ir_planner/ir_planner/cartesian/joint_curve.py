@@ -13,7 +13,7 @@ import numpy as np
 from ir_kernels import portable
 from ir_msgs_py.status import StatusCode
 from ir_planner.cartesian.chains import JUMP, ConfigurationChain, turned_towards
-from ir_planner.cartesian.path_parts import RotationRates, about_tool, rates_of
+from ir_planner.cartesian.orientations import RotationRates, about_tool, rates_of
 from ir_planner.cartesian.tool_path import PathRefusedError, ToolPath
 from ir_planner.checks import FreeSpace
 from ir_planner.scene import PlanningScene

@@ -22,7 +22,8 @@ from ir_planner.cartesian.path_movement import (
     farther_from_limits,
     timed,
 )
-from ir_planner.cartesian.path_parts import TURN_LENGTH, TURN_SPEED, parts_of
+from ir_planner.cartesian.path_parts import TURN_SPEED, parts_of
+from ir_planner.cartesian.place_curves import TURN_LENGTH
 from ir_planner.cartesian.tool_error import PathAccuracy, kept_of
 from ir_planner.cartesian.tool_path import (
     REVERSAL,

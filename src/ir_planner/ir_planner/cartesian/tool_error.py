@@ -6,8 +6,8 @@ import numpy as np
 
 from ir_kernels import portable
 from ir_planner.cartesian.joint_curve import Angle, tool_poses
-from ir_planner.cartesian.path_parts import TURN_LENGTH
 from ir_planner.cartesian.path_times import SentPath
+from ir_planner.cartesian.place_curves import TURN_LENGTH
 from ir_planner.cartesian.tool_path import ToolPath
 from ir_planner.checks import ToolDerivatives, tool_derivatives
 from ir_planner.scene import PlanningScene

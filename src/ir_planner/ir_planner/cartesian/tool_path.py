@@ -13,7 +13,9 @@ import numpy as np
 from ir_kernels import portable
 from ir_msgs_py.cartesian import TANGENT, CartesianPath
 from ir_msgs_py.status import Status, StatusCode
-from ir_planner.cartesian.path_parts import ArcLength, PathPart, RotationRates, about_tool, rates_of
+from ir_planner.cartesian.orientations import RotationRates, about_tool, rates_of
+from ir_planner.cartesian.path_parts import PathPart
+from ir_planner.cartesian.place_curves import ArcLength
 from ir_planner.checks import FreeSpace
 from ir_planner.curves import turn_of
 from ir_planner.request import Context
