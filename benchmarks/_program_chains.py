@@ -2,8 +2,8 @@
 
 The configurations at the stops are the planner's own. Every edge costs what the planner finds for
 it with the request's options; a chain is enumerated by dynamic programming. Edges are planned in
-the order of a lower
-bound that nothing can undercut: what is left unplanned cannot belong to a cheaper chain.
+the order of a lower bound that nothing can undercut: what is left unplanned cannot belong to a
+cheaper chain.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ir_msgs_py.names import NO_LOAD
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import TrajectoryReport
 from ir_planner import Goal, Planner, TimingError
-from ir_planner.program.chain import layers_of
+from ir_planner.program.station_chain import layers_of
 from ir_planner.program.steps import Route, Scenes, placed_steps, steps_of
 from ir_planner.program.stop_nodes import StopNode
 from ir_planner.request import Context, Journal, Work
@@ -32,8 +32,7 @@ from ir_values.arrays import BoolArray, FloatArray
 # Time: every joint alone, from rest to rest within speed, acceleration and jerk. Energy: Coulomb
 # friction over the distance that each joint has to turn, viscous friction (at least b d^2 / T), and
 # the potential energy of arm, load and gas spring that is gained; the capacitor starts empty, so
-# that it gives nothing. These are exact
-# inequalities: a search that prunes by them loses nothing.
+# that it gives nothing. These are exact inequalities: a search that prunes by them loses nothing.
 
 _SAMPLES = 200  # of a straight line along which static torque is integrated
 

@@ -17,9 +17,9 @@ from ir_msgs_py.report import MovementKind
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import Planner
 from ir_planner.errors import RequestError
-from ir_planner.program.chain import layers_of
 from ir_planner.program.movements import Movements, cost_of, rates_of
 from ir_planner.program.program import ProgramPlan, ProgramRequest, prepared
+from ir_planner.program.station_chain import layers_of
 from ir_planner.program.station_graph import ACROSS, ENTER, HopPart
 from ir_planner.request import Journal, Work
 from ir_planner.service import exit_searches

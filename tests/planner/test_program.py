@@ -17,8 +17,8 @@ from ir_msgs_py.report import MovementKind, TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import CancelledError, RequestError
 from ir_planner.planner import Planner
-from ir_planner.program.chain import TOLERANCE, layers_of
 from ir_planner.program.program import ProgramPlan, ProgramRequest, plan_program
+from ir_planner.program.station_chain import TOLERANCE, layers_of
 from ir_planner.program.steps import Route, Scenes, placed_steps, steps_of
 from ir_planner.regional.regional import plan_to_configurations
 from ir_planner.request.context import Context, Journal, Work

@@ -14,13 +14,13 @@ from ir_description.robot import ROBOTS
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_planner import Planner
-from ir_planner.program.chain import layers_of
 from ir_planner.program.choice import Choice
 from ir_planner.program.movement_fronts import Ladder
 from ir_planner.program.movements import Movements
 from ir_planner.program.program import plan_program, prepared
 from ir_planner.program.request import ProgramPlan, ProgramRequest, nobody
 from ir_planner.program.savings import CommonProgram, common_program, nearest_chain, savings_of
+from ir_planner.program.station_chain import layers_of
 from ir_planner.program.station_graph import StationChain
 from ir_planner.request import Journal, Work
 from ir_planner.search.registry import registered

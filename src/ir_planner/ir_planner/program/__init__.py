@@ -2,7 +2,6 @@
 modes.
 """
 
-from ir_planner.program.chain import cheapest_chain
 from ir_planner.program.choice import Choice
 from ir_planner.program.more_work import chosen
 from ir_planner.program.movement_fronts import Ladder, TimeValues
@@ -23,6 +22,7 @@ from ir_planner.program.rests import MOTORS, Rests, Steps, at_once, rests_at
 from ir_planner.program.savings import common_program, savings_of
 from ir_planner.program.spreads import Spreads, with_intervals
 from ir_planner.program.standby import Standby, plan_standby
+from ir_planner.program.station_chain import cheapest_chain
 from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, HopPart, StationChain
 from ir_planner.program.steps import (
     Doors,

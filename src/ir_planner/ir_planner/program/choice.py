@@ -8,11 +8,11 @@ from typing import Protocol
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import clearance_violation
-from ir_planner.program.chain import parts_of
 from ir_planner.program.movement_fronts import Ladder
 from ir_planner.program.movements import Failure, Movements
 from ir_planner.program.pauses import AUTO, Charge, PlannedPause, pause_by_itself, planned_pause
 from ir_planner.program.request import ProgramRequest, Progress, StageError
+from ir_planner.program.station_chain import parts_of
 from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, HopPart, StationChain
 from ir_planner.program.steps import PlacedStep, Route, Scenes, signal_text
 from ir_planner.scene import PlanningScene

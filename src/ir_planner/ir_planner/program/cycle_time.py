@@ -8,11 +8,11 @@ import numpy as np
 from ir_kernels import portable
 from ir_msgs_py.status import Status, StatusCode
 from ir_planner.errors import RequestError
-from ir_planner.program.chain import cheapest_chain
 from ir_planner.program.choice import Choice, Found, JoinedMovement, Steps
 from ir_planner.program.movement_fronts import FASTEST, FrontPoint, SlowDown, TimeValues, slow_downs
 from ir_planner.program.movements import rates_of
 from ir_planner.program.request import Progress, StageError
+from ir_planner.program.station_chain import cheapest_chain
 from ir_planner.program.station_graph import HopPart, StationChain
 from ir_planner.request import DURATION_MAX
 from ir_planner.timing import Movement

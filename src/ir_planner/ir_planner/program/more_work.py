@@ -17,12 +17,12 @@ from ir_planner.program.blending import (
     Blending,
     timed_with_blends,
 )
-from ir_planner.program.chain import cheapest_chain, layers_of
 from ir_planner.program.choice import Choice, Found, Steps
 from ir_planner.program.cycle_time import cycle_gap, free_gap
 from ir_planner.program.movement_fronts import FASTEST, Ladder, TimeValues
 from ir_planner.program.movements import Movements, WarmStarts, cost_of, rates_of
 from ir_planner.program.request import ProgramRequest, Progress, StageError
+from ir_planner.program.station_chain import cheapest_chain, layers_of
 from ir_planner.program.station_graph import ACROSS
 from ir_planner.program.steps import Route
 from ir_planner.request import Context, Work

@@ -16,11 +16,11 @@ from ir_msgs_py.status import Status, StatusCode
 from ir_planner.checks import total_report
 from ir_planner.errors import RequestError
 from ir_planner.program.blending import blended
-from ir_planner.program.chain import TOLERANCE, CostEdges, layers_of
 from ir_planner.program.choice import Choice, Steps
 from ir_planner.program.cycle_time import front_of
 from ir_planner.program.more_work import best_answer
 from ir_planner.program.movements import Movements
+from ir_planner.program.part_costs import CostEdges
 from ir_planner.program.pauses import AUTO
 from ir_planner.program.request import (
     ProgramPlan,
@@ -33,6 +33,7 @@ from ir_planner.program.request import (
 from ir_planner.program.rests import MOTORS
 from ir_planner.program.savings import held_against_common, named
 from ir_planner.program.spreads import Spreads
+from ir_planner.program.station_chain import TOLERANCE, layers_of
 from ir_planner.program.station_graph import HopPart, Settled, StationGraph
 from ir_planner.program.steps import Route, Scenes, doors_advice, doors_text, placed_steps, steps_of
 from ir_planner.program.stop_nodes import StopNode, leaves_zone

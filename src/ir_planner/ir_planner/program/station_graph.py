@@ -4,10 +4,9 @@ lazily.
 A hop leads from one stop to the next in three parts: leaving the first (service line), across,
 entering the second. Every part starts with a lower bound of its cost. The cheapest chain is found
 with what is known, its open parts are settled (to a higher bound or to their true cost), and that
-repeats until the cheapest chain is
-settled as a whole: then it is the cheapest of all, because no other can cost less than its bounds.
-Where work ends first, the cheapest settled chain is the answer, and `bound` says what the best
-could still cost.
+repeats until the cheapest chain is settled as a whole: then it is the cheapest of all, because no
+other can cost less than its bounds. Where work ends first, the cheapest settled chain is the
+answer, and `bound` says what the best could still cost.
 """
 
 from collections.abc import Callable
