@@ -20,10 +20,10 @@ from ir_cli.main import main
 from ir_description import Body, CellFileError, cell_from_yaml, cell_to_yaml, load_cell
 from ir_description.files import convex_pieces as coacd_process
 from ir_description.files import convex_pieces as convex
-from ir_description.files import solid_mesh
-from ir_description.files import solid_mesh as piece_cache
+from ir_description.files import piece_cache, solid_mesh
 from ir_description.files.convex_pieces import ConvexPieces, contains, protrusion, winding
-from ir_description.files.solid_mesh import pieces_of, triangles_from_obj
+from ir_description.files.piece_cache import pieces_of
+from ir_description.files.solid_mesh import triangles_from_obj
 from ir_description.files.stl_mesh import is_closed
 from ir_description.shapes import point_distance
 from ir_values.arrays import FloatArray
@@ -109,13 +109,13 @@ equipment:
 @pytest.fixture(scope="module")
 def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     folder = tmp_path_factory.mktemp("cache")
-    before = os.environ.get(piece_cache.FOLDER)
-    os.environ[piece_cache.FOLDER] = str(folder)
+    before = os.environ.get(piece_cache.FOLDER_VARIABLE)
+    os.environ[piece_cache.FOLDER_VARIABLE] = str(folder)
     yield folder
     if before is None:
-        del os.environ[piece_cache.FOLDER]
+        del os.environ[piece_cache.FOLDER_VARIABLE]
     else:
-        os.environ[piece_cache.FOLDER] = before
+        os.environ[piece_cache.FOLDER_VARIABLE] = before
 
 
 @pytest.fixture(scope="module")

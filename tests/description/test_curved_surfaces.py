@@ -14,7 +14,7 @@ from ir_cli.main import main
 from ir_description.files import curved_surfaces
 from ir_description.files.convex_pieces import point_triangle
 from ir_description.files.curved_surfaces import triangles_of_surfaces
-from ir_description.files.solid_mesh import SolidReader
+from ir_description.files.solid_reader import SolidReader
 from ir_description.files.stl_mesh import is_closed
 from ir_values.errors import InvalidValueError
 

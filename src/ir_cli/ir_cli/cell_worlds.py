@@ -27,7 +27,7 @@ from ir_description.cell import shape_register, zone_around
 from ir_description.files import point_cloud
 from ir_description.files.curved_surfaces import KINDS as SURFACES
 from ir_description.files.curved_surfaces import NOT_PROVED
-from ir_description.files.solid_mesh import PIECES, PIECES_MAX, UNITS, SolidReader
+from ir_description.files.solid_reader import PIECES, PIECES_MAX, UNITS, SolidReader
 from ir_description.files.worlds import IMPORTERS, WRITERS, read_world
 from ir_description.library import robot_named
 from ir_recorder.report.shapes import body_mesh

@@ -40,7 +40,7 @@ from ir_description.cell import (
 )
 from ir_description.files.point_cloud import CloudReader
 from ir_description.files.robot_file import inertia_matrix
-from ir_description.files.solid_mesh import SolidReader, piece_names
+from ir_description.files.solid_reader import SolidReader, piece_names
 from ir_description.files.stl_mesh import (
     CELL_TRIANGLES_MAX,
     CORNERS_MAX,

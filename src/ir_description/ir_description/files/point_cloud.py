@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from ir_description.files.solid_mesh import MISSING, SIZE_MAX, UNITS
+from ir_description.files.solid_mesh import MISSING
+from ir_description.files.solid_reader import SIZE_MAX, UNITS
 from ir_description.files.stl_mesh import mesh_path
 from ir_values.arrays import FloatArray, IntArray
 from ir_values.errors import InvalidValueError, shown

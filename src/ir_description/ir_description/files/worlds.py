@@ -19,8 +19,10 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ir_description.cell import Cell, Equipment, NameRegister
 from ir_description.files.moveit_scene import SceneObject, scene_objects
+from ir_description.files.piece_cache import pieces_of
 from ir_description.files.sdf_frames import Frames
-from ir_description.files.solid_mesh import PIECES, SUFFIXES, piece_names, pieces_of, read_solid
+from ir_description.files.solid_mesh import SUFFIXES, read_solid
+from ir_description.files.solid_reader import PIECES, piece_names
 from ir_description.files.stl_mesh import is_closed
 from ir_description.poses import abc_from_rotation, composed, inverse, pose_of, rotation_from_abc
 from ir_description.shapes import Body
