@@ -15,7 +15,7 @@ from ir_description import load_cell, load_power_data
 from ir_msgs_py.options import PlanOptions
 from ir_planner.checks.evaluation import evaluate_trajectory
 from ir_planner.program.cost_bounds import (
-    MARGIN,
+    COST_MARGIN,
     CoarseCost,
     Rates,
     least_cost,
@@ -107,7 +107,7 @@ def test_a_coarse_solution_less_its_margin_is_below_the_planner_s_movement(
             continue
         report = plan.report
         cost = report.energy - report.base_energy + options.time_value * report.duration
-        assert (1.0 - MARGIN) * coarse.between(a, b) <= cost
+        assert (1.0 - COST_MARGIN) * coarse.between(a, b) <= cost
 
 
 @settings(max_examples=25, deadline=None)
@@ -119,4 +119,4 @@ def test_a_coarse_movement_whose_ends_are_turned_alike_costs_the_same(seed: int)
     first, second = rng.uniform(low, high - whole, (2, ROBOT.n))
     coarse = CoarseCost(asked(SCENE, PlanOptions()), Rates(1.0, 500.0))
     turned = coarse.between(first + whole, second + whole)
-    assert turned == pytest.approx(coarse.between(first, second), rel=0.1 * MARGIN)
+    assert turned == pytest.approx(coarse.between(first, second), rel=0.1 * COST_MARGIN)

@@ -14,10 +14,10 @@ from typing import Literal
 import numpy as np
 
 from ir_cli.planning import CEILING, clock
-from ir_cli.station_access import MARGIN, AccessLine, StationVisit, lines_of, visits
+from ir_cli.station_access import AccessLine, StationVisit, lines_of, visits
 from ir_description import Cell, Equipment, Station, cell_to_yaml
 from ir_description.cell import AllowedContact
-from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.options import DEFAULT_SAFETY_DISTANCE, PlanOptions
 from ir_planner import Planner
 from ir_values.arrays import FloatArray
 
@@ -132,7 +132,7 @@ def zone_lacks(machine: Equipment, places: FloatArray) -> bool:
     beyond = np.maximum(
         np.abs((places - zone.pose[:3, 3]) @ zone.pose[:3, :3]) - 0.5 * zone.size, 0.0
     )
-    return bool((np.linalg.norm(beyond, axis=1) > MARGIN).any())
+    return bool((np.linalg.norm(beyond, axis=1) > DEFAULT_SAFETY_DISTANCE).any())
 
 
 def contacts_yaml(station: Station) -> Iterator[str]:
@@ -204,6 +204,12 @@ def mended_cell(cell: Cell) -> tuple[Cell, list[Suggestion]]:
     return mended, suggestions
 
 
+def _kept_by_none(best: str) -> str:
+    """Sentence where no configuration keeps the safety distance; best: what is said of the best."""
+    kept = 1e3 * DEFAULT_SAFETY_DISTANCE
+    return f"no configuration keeps {kept:g} mm; in the best of them {best}"
+
+
 def _station(cell: Cell, name: str, found: Sequence[StationVisit]) -> tuple[Cell, list[Suggestion]]:
     """The cell with what a station lacks, and what that is."""
     station = cell.station(name)
@@ -219,9 +225,7 @@ def _station(cell: Cell, name: str, found: Sequence[StationVisit]) -> tuple[Cell
     given = station.approach_distance
     suggestions = list[Suggestion]()
     if best.contacts:
-        sentence = (
-            f"no configuration keeps {1e3 * MARGIN:g} mm; in the best of them {best.sentence}"
-        )
+        sentence = _kept_by_none(best.sentence)
         station = with_contacts(station, best.contacts)
         suggestions.append(Suggestion("error", name, sentence, "\n".join(contacts_yaml(station))))
     if best.approach != given:
@@ -248,9 +252,7 @@ def _without_line(
     suggestions = []
     if best.contacts:
         station = with_contacts(station, best.contacts)
-        sentence = (
-            f"no configuration keeps {1e3 * MARGIN:g} mm; in the best of them {best.sentence}"
-        )
+        sentence = _kept_by_none(best.sentence)
         suggestions.append(Suggestion("error", name, sentence, "\n".join(contacts_yaml(station))))
     given = station.approach_distance or DISTANCES[0]
     out = f"has no free straight line out of {given:g} m: {_why(found, given)}"
@@ -291,7 +293,7 @@ def _by(best: SuggestedExit, found: Sequence[StationVisit]) -> str:
     if model.pairs[z].kind == "SELF":
         return ""
     normal = model.witnesses(worst.q[None], np.array([z])).normal[0]
-    step = (MARGIN - pair.distance) * normal
+    step = (DEFAULT_SAFETY_DISTANCE - pair.distance) * normal
     return " by ({}) m in the world".format(", ".join(f"{each + 0.0:.3f}" for each in step))
 
 

@@ -20,9 +20,9 @@ from ir_kernels import (
 from ir_kernels.inverse_kinematics import SearchedIk, ThreeParallelIk
 from ir_kernels.spherical_wrist import SphericalWristIk
 from ir_kernels.wrist_geometry import arm_lines
+from ir_msgs_py.options import DEFAULT_SAFETY_DISTANCE
 from ir_values.arrays import FloatArray
 
-MARGIN = 0.02  # m, the default of a request
 POSTURES = 2000  # random ones in which the drives hold the arm, and links keep their distance
 NEAR = 0.4  # share of postures; of the bundled robots' pairs 0.31 at most
 METHODS = {
@@ -87,8 +87,9 @@ def _home(robot: RobotModel, chain: Chain) -> Iterator[Remark]:
 
 def _kept(robot: RobotModel, model: CollisionModel) -> FloatArray:
     """What pairs (Z,) must keep [m]."""
+    usual = DEFAULT_SAFETY_DISTANCE
     own = {frozenset(each[:2]): each.distance for each in robot.reduced_distances}
-    return np.array([min(MARGIN, own.get(frozenset((a, b)), MARGIN)) for _, a, b in model.pairs])
+    return np.array([min(usual, own.get(frozenset((a, b)), usual)) for _, a, b in model.pairs])
 
 
 def _postures(robot: RobotModel) -> FloatArray:
@@ -110,7 +111,8 @@ def _near_itself(robot: RobotModel, chain: Chain) -> Iterator[Remark]:
         yield Remark("note", "self_pairs", sentence)
     for z in np.flatnonzero(near > NEAR):
         pair = model.pairs[int(z)]
-        often = f"{1e3 * MARGIN:g} mm in {100.0 * near[z]:.0f} % of {POSTURES} postures"
+        share = 100.0 * near[z]
+        often = f"{1e3 * DEFAULT_SAFETY_DISTANCE:g} mm in {share:.0f} % of {POSTURES} postures"
         yield Remark(
             "warning",
             "self_pairs",

@@ -14,6 +14,7 @@ from ir_cli.output import Columns, Row, number, text
 from ir_description import Cell, Station
 from ir_description.cell import AllowedContact
 from ir_description.cell_review import CellFinding
+from ir_msgs_py.options import DEFAULT_SAFETY_DISTANCE
 from ir_planner.configurations import free_configurations, no_configuration
 from ir_planner.program.steps import Route, Scenes, placed_steps
 from ir_planner.scene import PlanningScene, tcp_inside
@@ -24,7 +25,6 @@ from ir_values.arrays import FloatArray
 
 # Situations at a station, and the configurations that reach it.
 
-MARGIN = 0.02  # m, the default of a request
 _SAME = 1e-6  # rad
 _ABOUT = 0.02  # rad about machine home
 
@@ -112,7 +112,7 @@ def stations_of(cell: Cell) -> list[Row]:
 def _row(visit: StationVisit, cell: Cell) -> Row:
     station = visit.station
     scene = visit.scene
-    threshold = scene.thresholds(MARGIN, station.name)
+    threshold = scene.thresholds(DEFAULT_SAFETY_DISTANCE, station.name)
     found = free_configurations(station.pose, scene, threshold, cell.machine_home)
     none = (
         "" if len(found.q) else no_configuration(station.pose, scene, found, station.name).message
@@ -216,10 +216,10 @@ def _judged(points: FloatArray, count: int, station: Station, scene: PlanningSce
     tcp = scene.chain.tcp_poses(points)[:, :3, 3]
     out = np.linalg.norm(tcp - tcp[0], axis=1)
     whole = len(points) == count
-    kept = scene.thresholds(MARGIN, station.name)
+    kept = scene.thresholds(DEFAULT_SAFETY_DISTANCE, station.name)
     last = np.arange(len(points)) == (count - 1 if count > 1 else -1)
-    plain = last | ~tcp_inside(points, scene, station.name, MARGIN)
-    violated = distance <= np.where(plain[:, None], MARGIN, kept)
+    plain = last | ~tcp_inside(points, scene, station.name, DEFAULT_SAFETY_DISTANCE)
+    violated = distance <= np.where(plain[:, None], DEFAULT_SAFETY_DISTANCE, kept)
     pairs = np.flatnonzero(violated.any(axis=0))
     found = []
     for z in pairs:
@@ -228,12 +228,12 @@ def _judged(points: FloatArray, count: int, station: Station, scene: PlanningSce
         b = scene.collision.pairs[z].body_b
         found.append(Near(a, b, float(distance[k, z]), float(out[k])))
     least = distance.min(axis=0, initial=np.inf)
-    at_end = (distance[last] <= MARGIN).any(axis=0)
+    at_end = (distance[last] <= DEFAULT_SAFETY_DISTANCE).any(axis=0)
     mendable = whole and all(
         least[z] > 0.0 and not at_end[z] and _by_hand(int(z), scene) for z in pairs
     )
     contacts = tuple(_contact(int(z), float(least[z]), scene) for z in pairs if least[z] <= kept[z])
-    within = tcp[(distance <= MARGIN).any(axis=1) & ~last]
+    within = tcp[(distance <= DEFAULT_SAFETY_DISTANCE).any(axis=1) & ~last]
     near = tuple(sorted(found, key=lambda each: each.distance))
     return AccessLine(points[0], float(out[-1]), whole, near, mendable, contacts, within)
 

@@ -16,6 +16,8 @@ ROBOTS_TIME_VALUE = -1.0
 NO_TILT = -1.0
 """The tilt_max of who asks for none."""
 TILT_MAX = math.pi
+DEFAULT_SAFETY_DISTANCE = 0.02
+"""The safety_distance [m] of who names none."""
 UP = (0.0, 0.0, 1.0)
 """The tilt_direction of who names none."""
 
@@ -43,7 +45,7 @@ class PlanOptions:
     random_seed: bool = False
     max_iterations: int = 0
     planning_time: float = 5.0
-    safety_distance: float = 0.02
+    safety_distance: float = DEFAULT_SAFETY_DISTANCE
     objective: str = "time_and_energy"
     time_value: float = ROBOTS_TIME_VALUE
     duration: float = 0.0

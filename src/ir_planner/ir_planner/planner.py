@@ -22,7 +22,7 @@ from ir_description.cell import VIA_TOLERANCE, CellPath, ToolTilt
 from ir_kernels import KernelError
 from ir_kernels.data import pose as rigid_pose
 from ir_msgs_py.cartesian import CartesianPath
-from ir_msgs_py.options import NO_TILT, PlanOptions
+from ir_msgs_py.options import DEFAULT_SAFETY_DISTANCE, NO_TILT, PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.cartesian import CartesianPlan, checked_path_options, plan_path
@@ -55,6 +55,7 @@ from ir_planner.request import (
     Journal,
     Work,
     bounded,
+    check_safety_distance,
     checked_options,
     chosen,
     cone_of,
@@ -69,9 +70,6 @@ from ir_planner.request import (
     tool_bounds_of,
     upright_options,
     within_limits,
-)
-from ir_planner.request import (
-    safety_distance as checked_margin,
 )
 from ir_planner.scene import PlanningScene
 from ir_planner.service import (
@@ -116,7 +114,6 @@ CLOCK: Clock = time.monotonic
 """What ceilings of time are held against where nobody gives another clock."""
 
 _NEVER: Cancelled = lambda: False  # noqa: E731 - a default argument
-MARGIN = 0.02  # m: S_m where a request names none, as in the messages
 
 
 class OptionFields(TypedDict, total=False):
@@ -253,7 +250,7 @@ class Planner:
         self,
         q: Place,
         *,
-        safety_distance: float = MARGIN,
+        safety_distance: float = DEFAULT_SAFETY_DISTANCE,
         max_pairs: int = 5,
         load: str = "",
         station: str = "",
@@ -263,7 +260,12 @@ class Planner:
         return asked_state(self.scene(load), state, safety_distance, max_pairs, station)
 
     def check_states(
-        self, q: FloatArray, *, safety_distance: float = MARGIN, load: str = "", station: str = ""
+        self,
+        q: FloatArray,
+        *,
+        safety_distance: float = DEFAULT_SAFETY_DISTANCE,
+        load: str = "",
+        station: str = "",
     ) -> StatesCheck:
         """Checks of many states q (N, n) [rad], with the nearest pair of each."""
         return asked_states(self.scene(load), q, safety_distance, station)
@@ -273,7 +275,7 @@ class Planner:
         goal: Place,
         *,
         method: str = "analytic",
-        safety_distance: float = MARGIN,
+        safety_distance: float = DEFAULT_SAFETY_DISTANCE,
         near: Place | None = None,
         load: str = "",
         starts: int = 32,
@@ -284,7 +286,7 @@ class Planner:
         (ccd).
         """
         chosen(method, IK_METHODS, "method")
-        checked_margin(safety_distance)
+        check_safety_distance(safety_distance)
         bounded(starts, 1, STARTS_MAX, "starts")
         here = self._configuration(near, "near", StatusCode.INVALID_ROBOT_STATE)
         options = options_with(None, {"safety_distance": safety_distance, "seed": seed})
@@ -296,7 +298,7 @@ class Planner:
         self,
         trajectory: JointTrajectory,
         *,
-        safety_distance: float = MARGIN,
+        safety_distance: float = DEFAULT_SAFETY_DISTANCE,
         load: str = "",
         station: str = "",
         tilt_max: float = NO_TILT,

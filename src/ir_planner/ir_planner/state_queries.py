@@ -11,7 +11,7 @@ from ir_msgs_py.status import StatusCode
 from ir_planner.checks import StateCheck, state_check
 from ir_planner.errors import RequestError
 from ir_planner.program import with_doors
-from ir_planner.request import bounded, joint_values, safety_distance, within_limits
+from ir_planner.request import bounded, check_safety_distance, joint_values, within_limits
 from ir_planner.scene import END_TOLERANCE, PlanningScene
 from ir_values.arrays import BoolArray, FloatArray
 
@@ -26,7 +26,7 @@ def asked_state(
 
     Raises RequestError for what makes no sense.
     """
-    safety_distance(margin)
+    check_safety_distance(margin)
     bounded(max_pairs, 0, PAIRS_MAX, "max_pairs")
     q = within_limits(q, scene.cell, "state", StatusCode.INVALID_ROBOT_STATE)
     found = state_check(q, scene, margin, max_pairs, station)
@@ -51,7 +51,7 @@ def asked_states(scene: PlanningScene, q: FloatArray, margin: float, station: st
     """The same for many states q (N, n) at once: one call of the compiled core, two where a station
     allows contacts. Raises RequestError, which names the first bad state by its index.
     """
-    safety_distance(margin)
+    check_safety_distance(margin)
     if not 1 <= len(q) <= STATES_MAX:
         raise RequestError(
             StatusCode.INVALID_ROBOT_STATE,

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ir_cli.station_access import MARGIN, StationVisit, visits
+from ir_cli.station_access import StationVisit, visits
 from ir_description import Cell, PartPlaces
 from ir_kernels import CollisionModel
+from ir_msgs_py.options import DEFAULT_SAFETY_DISTANCE
 from ir_msgs_py.report import PlannedMovement
 from ir_planner.configurations import free_configurations, no_configuration
 from ir_recorder.analysis.clearance import allowed_pairs, collision_model
@@ -44,7 +45,7 @@ def station_accesses(cell: Cell, first: Collection[str] = ()) -> Iterator[Statio
 def _judged(visit: StationVisit) -> StationAccess:
     station = visit.station
     scene = visit.scene
-    threshold = scene.thresholds(MARGIN, station.name)
+    threshold = scene.thresholds(DEFAULT_SAFETY_DISTANCE, station.name)
     found = free_configurations(station.pose, scene, threshold, scene.cell.machine_home)
     free = len(found.q)
     q = found.q

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from ir_cli.errors import CommandError
-from ir_cli.station_access import MARGIN
 from ir_cli.view.background import QUIET, Inbox, Listener, Planned, PlanWorker, ViewRequest
 from ir_cli.view.cell_file import Recorded, Watched, save
 from ir_cli.view.clearance import Nearest, NearestPairs, StationAccess, names_in
@@ -28,6 +27,7 @@ from ir_cli.view.playback import PlayedMotion
 from ir_cli.view.scene import planned_content, recorded_content, still_content
 from ir_description import Cell, DescriptionError, PartPlaces, cell_to_yaml
 from ir_description.poses import composed, inverse
+from ir_msgs_py.options import DEFAULT_SAFETY_DISTANCE
 from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_recorder.live.server import ButtonAnswer, LiveServer, Site
 from ir_recorder.live.stream import Stream
@@ -120,7 +120,7 @@ class ShownCell:
         """Bodies and capsules that are too near or obstruct."""
         names = set(names_in(f"{self.failure} {' '.join(self.errors)}", self.cell))
         names.update(name for each in self.found if not each.free for name in each.pair)
-        if self.near is not None and self.near.distance < MARGIN:
+        if self.near is not None and self.near.distance < DEFAULT_SAFETY_DISTANCE:
             names.update(self.near.names)
         return sorted(names)
 
@@ -404,7 +404,9 @@ class Session:
             return
         analysis = source.analysis
         known = np.isfinite(analysis.safety_distance)
-        content = page_content(analysis, analysis.safety_distance if known else MARGIN)
+        content = page_content(
+            analysis, analysis.safety_distance if known else DEFAULT_SAFETY_DISTANCE
+        )
         self._motion = None
         self._draw(recorded_content(content, shown.cell))
         recording = analysis.recording
@@ -565,7 +567,7 @@ def _access(each: StationAccess) -> list[Json]:
     words = f"{each.free} of {each.reached} free"
     if each.free and each.clearance is not None:
         words += f", {1e3 * each.clearance:.1f} mm"
-        words += " to allowed contacts" if each.clearance < MARGIN else ""
+        words += " to allowed contacts" if each.clearance < DEFAULT_SAFETY_DISTANCE else ""
     return [each.station, each.load, words, each.free > 0, one_line(each.sentence, _LINE)]
 
 

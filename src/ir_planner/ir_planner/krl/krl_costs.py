@@ -12,7 +12,7 @@ from ir_krl.run import Note, SignalRange
 from ir_krl.urscript import follow_urscript
 from ir_krl.write import PLC_DONE, PLC_PAUSE, FrameNumbers, PlcPause, frame_numbers
 from ir_msgs_py.modes import TransitionTimes
-from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.options import DEFAULT_SAFETY_DISTANCE, PlanOptions
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_msgs_py.status import StatusCode
 from ir_planner.checks import Evaluation, evaluate_trajectory, total_report
@@ -26,7 +26,7 @@ from ir_planner.krl.step_evaluation import evaluator_of
 from ir_planner.krl.surroundings import Surroundings, wires_of
 from ir_planner.planner import Planner
 from ir_planner.program import Charge, PlannedPause, Scenes, spent
-from ir_planner.request import POSTURES, safety_distance
+from ir_planner.request import POSTURES, check_safety_distance
 from ir_planner.scene import PlanningScene, load_text
 from ir_planner.timing import standing
 from ir_planner.validity import in_scene
@@ -211,7 +211,7 @@ def follow_ur(planner: Planner, text: str, file: str) -> Followed:
 def evaluate_krl(
     planner: Planner,
     program: Followed,
-    margin: float = 0.02,
+    margin: float = DEFAULT_SAFETY_DISTANCE,
     load: str = "",
     plc: Mapping[int, PlcPause] | None = None,
 ) -> EvaluatedProgram:
@@ -221,7 +221,7 @@ def evaluate_krl(
 
     Raises RequestError, KrlMotionError.
     """
-    safety_distance(margin)
+    check_safety_distance(margin)
     asked = planner.scene(load)
     around = surroundings(planner, program, load)
     times = planner.heard.transitions

@@ -22,6 +22,7 @@ from ir_kernels import portable
 from ir_msgs.msg import CartesianSegment, PlanOptions
 from ir_msgs.srv import ComputeIk, PlanCartesianMovement, PlanRegionalMovement
 from ir_msgs_py import names
+from ir_msgs_py.options import DEFAULT_SAFETY_DISTANCE
 from ir_msgs_py.ros.conversions import pose_to_msg, stamped_pose_to_msg
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
@@ -55,7 +56,11 @@ class MoveItSettings:
         read_only=True,
     )
     safety_distance: float = setting(
-        0.02, "Distance that everything keeps.", unit="m", minimum=0.0, maximum=1.0
+        DEFAULT_SAFETY_DISTANCE,
+        "Distance that everything keeps.",
+        unit="m",
+        minimum=0.0,
+        maximum=1.0,
     )
     tool_speed: float = setting(
         0.25,

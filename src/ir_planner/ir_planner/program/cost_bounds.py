@@ -86,10 +86,10 @@ def least_cost(
 # The descent is that of movements, on a spline with fewer points, without clearance. A movement
 # that keeps clear of everything has one constraint more, so it costs as much or more, but for two
 # things: the descent may end in a poorer local minimum than the planner's, and a coarse spline
-# bends less. MARGIN is for both; benchmarks/program.py judges it by what chosen chains cost above
-# the best of all chains.
+# bends less. COST_MARGIN is for both; benchmarks/program.py judges it by what chosen chains cost
+# above the best of all chains.
 
-MARGIN = 0.04  # share of a coarse cost by which the planner's movement may be cheaper
+COST_MARGIN = 0.04  # share of a coarse cost by which the planner's movement may be cheaper
 _SPACING = 0.1  # s between the knots of the coarse spline
 # its control points
 _FEWEST = 12

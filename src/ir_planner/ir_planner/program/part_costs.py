@@ -13,7 +13,7 @@ import numpy as np
 
 from ir_kernels import portable
 from ir_planner.checks import FreeSpace
-from ir_planner.program.cost_bounds import MARGIN, CoarseCost, least_cost
+from ir_planner.program.cost_bounds import COST_MARGIN, CoarseCost, least_cost
 from ir_planner.program.movements import Failure, Movements, cost_of, rates_of
 from ir_planner.program.station_graph import ACROSS, ENTER, LEAVE, HopBounds, HopPart, Settled
 from ir_planner.program.steps import Route
@@ -123,7 +123,7 @@ class CostEdges:
         key = part.hop, turn_free_bytes(first), np.round(second - first, 6).tobytes()
         if key not in self._coarse_found:  # ends that differ by the same whole turns
             self._coarse_found[key] = self._coarse_costs[part.hop].between(first, second)
-        return Settled(self._coarse_found[key] * (1.0 - MARGIN), exact=False, proved=False)
+        return Settled(self._coarse_found[key] * (1.0 - COST_MARGIN), exact=False, proved=False)
 
     def _costs_planned(self, parts: list[HopPart]) -> list[Settled]:
         """Costs of the movements. Service lines whose joints differ by whole turns cost the same:

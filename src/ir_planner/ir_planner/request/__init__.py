@@ -26,11 +26,11 @@ from ir_planner.request.request_bounds import (
     DURATION_MAX,
     POSITION_MAX,
     bounded,
+    check_safety_distance,
     checked_options,
     chosen,
     examinable,
     leaning_freely_only,
-    safety_distance,
 )
 
 __all__ = [
@@ -43,6 +43,7 @@ __all__ = [
     "Journal",
     "Work",
     "bounded",
+    "check_safety_distance",
     "checked_options",
     "chosen",
     "cone_of",
@@ -56,7 +57,6 @@ __all__ = [
     "one_goal",
     "one_tilt",
     "parse_goal",
-    "safety_distance",
     "tool_bounds_of",
     "upright_options",
     "within_limits",

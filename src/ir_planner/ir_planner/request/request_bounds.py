@@ -55,9 +55,9 @@ def chosen(value: str, known: tuple[str, ...], name: str) -> str:
     return value
 
 
-def safety_distance(value: float) -> float:
-    """S_m [m]: 0 is taken literally."""
-    return bounded(value, 0.0, SAFETY_DISTANCE_MAX, "safety_distance", "m")
+def check_safety_distance(value: float) -> None:
+    """Raise RequestError for an S_m [m] beyond its bounds; 0 is taken literally."""
+    bounded(value, 0.0, SAFETY_DISTANCE_MAX, "safety_distance", "m")
 
 
 def leaning_freely_only(options: PlanOptions, what: str) -> None:
@@ -73,7 +73,7 @@ def checked_options(options: PlanOptions) -> tuple[PlanOptions, str]:
     """The options within the planner's bounds, and a note where planning_time was capped (""
     else).
     """
-    safety_distance(options.safety_distance)
+    check_safety_distance(options.safety_distance)
     if options.time_value != ROBOTS_TIME_VALUE:
         bounded(options.time_value, 0.0, TIME_VALUE_MAX, "time_value", "W")
     if options.duration != 0.0:  # 0: free
