@@ -32,8 +32,7 @@ SAFETY = 0.02
 """Safety distance [m] of a request that says nothing."""
 POSTURES = 3000
 NEAR = 0.25
-"""Share of postures that a pair may take from the robot before it counts as near by
-construction.
+"""Share of postures that a pair may take from the robot before it counts as near by construction.
 """
 ROOM = 0.002
 """m below the distance that a tenth of the postures do not reach."""

@@ -162,9 +162,8 @@ class AccessLine:
     """The line out of a station in one configuration q (n,); reach [m]: how far it can be followed.
 
     near: pairs too near with what the station allows, the nearest first. mendable: contacts and a
-    zone would
-    make it free: these contacts, and a zone that holds the places (P, 3) [m] of the tcp in
-    `within`.
+    zone would make it free: these contacts, and a zone that holds the places (P, 3) [m] of the tcp
+    in `within`.
     """
 
     q: FloatArray

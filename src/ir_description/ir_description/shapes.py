@@ -219,8 +219,7 @@ def _hull_distance(vertices: FloatArray, point: FloatArray) -> float:
 
 def overlapping(first: FloatArray, second: FloatArray) -> Iterator[tuple[int, int]]:
     """Numbers of the boxes of `first` (A, 2, 3) and `second` (B, 2, 3), lowest and highest corner,
-    that
-    overlap or touch: a in order, and for each a its b in order.
+    that overlap or touch: a in order, and for each a its b in order.
     """
     order = np.argsort(second[:, 0, 0], kind="stable")
     low = second[order, 0]

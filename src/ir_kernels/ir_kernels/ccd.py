@@ -77,10 +77,9 @@ def ccd(
     """Bring `chain`'s tcp to `pose` (4, 4) in the world from each of `starts` (P, n) rad.
 
     Each joint in turn, from the tool to the base, takes the value within [position_min,
-    position_max] (n,)
-    that minimises Psi: closed form per joint, so Psi never grows. Starts outside the limits are
-    moved onto them. Starts don't know of each other: a start ends the same in any batch. Raises
-    KernelError, also for a chain with a rail.
+    position_max] (n,) that minimises Psi: closed form per joint, so Psi never grows. Starts outside
+    the limits are moved onto them. Starts don't know of each other: a start ends the same in any
+    batch. Raises KernelError, also for a chain with a rail.
     """
     if chain.first_slides:
         raise KernelError(

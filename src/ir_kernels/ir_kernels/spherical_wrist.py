@@ -19,11 +19,10 @@ class SphericalWristIk:
     """All configurations within the limits that bring `chain`'s tcp to a pose.
 
     position_min, position_max (6,) rad. A singular wrist (axes 4 and 6 parallel) leaves one
-    parameter
-    free: the representative with q4 = 0 (or the limit nearest to 0) is given; a wrist centre on
-    axis 1 likewise gives q1 = 0 and its opposite. Raises KernelError where the chain isn't a 6R arm
-    with z1 _|_ z2
-    || z3, z4 _|_ z5 _|_ z6 and axes 4 to 6 meeting in a point (1e-9 m).
+    parameter free: the representative with q4 = 0 (or the limit nearest to 0) is given; a wrist
+    centre on axis 1 likewise gives q1 = 0 and its opposite. Raises KernelError where the chain
+    isn't a 6R arm with z1 _|_ z2 || z3, z4 _|_ z5 _|_ z6 and axes 4 to 6 meeting in a point
+    (1e-9 m).
     """
 
     def __init__(

@@ -34,9 +34,9 @@ class SplineTerms:
     capacity_energy [J] and regeneration: see DcBusParameters; smoothing [W]: by how much the bus'
     switch between mains, capacitor and resistor is rounded, 0: not at all. clearance_margin,
     clearance_scale [m]. penalty, clearance_penalty: cost per second of a relative excess of 1.
-    tilt_axis (3,) in the last link
-    may lean by tilt_max [rad] from tilt_direction (3,) in the world, pi: as it likes; an excess of
-    tilt_scale [rad] counts like one of 1, with clearance_penalty.
+    tilt_axis (3,) in the last link may lean by tilt_max [rad] from tilt_direction (3,) in the
+    world, pi: as it likes; an excess of tilt_scale [rad] counts like one of 1, with
+    clearance_penalty.
     """
 
     velocity: FloatArray

@@ -223,13 +223,12 @@ class PlannedMovement:
 
     kind: a MovementKind. trajectory_id: "" for a pause; trajectory: None where only the id is
     known. duration [s]. power_mode: the mode to rest in (pauses), "" = STAND_ON_MOTORS, several as
-    in modes_of. attach,
-    detach: load that is attached or detached when this step has ended; load: what is attached while
-    it runs ("gripper+part", "none"). wait_for: signals of the machines to wait for before;
-    set_signals: to set after, "name=0" clears; states: of machines that it relies on,
-    "lathe=door_open". since: signal that a pause is for, "" for none: it ends as long after that
-    was set as planned. passes: stops that it passes without standing still, which messages don't
-    carry.
+    in modes_of. attach, detach: load that is attached or detached when this step has ended; load:
+    what is attached while it runs ("gripper+part", "none"). wait_for: signals of the machines to
+    wait for before; set_signals: to set after, "name=0" clears; states: of machines that it relies
+    on, "lathe=door_open". since: signal that a pause is for, "" for none: it ends as long after
+    that was set as planned. passes: stops that it passes without standing still, which messages
+    don't carry.
     """
 
     kind: str

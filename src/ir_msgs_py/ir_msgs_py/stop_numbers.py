@@ -1,4 +1,4 @@
-"""Numbers of stops: of which driver process a stop is, and the how many'th there.
+"""Numbers of stops: each says which driver process the stop belongs to, and counts its stops.
 
 A number is the time at which its driver was started [ms since 1970] times a million, plus the count
 of its stops: no two processes have a number in common, and later ones are greater.

@@ -196,8 +196,8 @@ class CurrentCell:
         return replace(scene, cell_hash=self.hash_of(cell), doors=doors)
 
     def _replaced_by(self, cell: Cell) -> Cell:
-        """The cell from now on; its models of all pairs, a second's work in a large one, are built
-        before.
+        """Take this cell from now on. Its models of all pairs are built first, which takes a second
+        in a large one.
         """
         try:
             load = self._attached(cell)

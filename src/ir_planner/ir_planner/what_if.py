@@ -3,9 +3,9 @@
     table = what_if("demo", {"mass gear": [10, 20, 40], "cycle_time": [0, 120]}, workers=2)
 
 One row for each combination of values, in order; pandas.DataFrame(table) takes it as it is. What
-can be
-changed: `cycle_time` [s], `time_value` [W], `safety_distance` [m], `mass NAME` [kg] of the tool or
-a part, `x NAME`, `y NAME`, `z NAME` [m], how far a machine or a station is moved in the world.
+can be changed: `cycle_time` [s], `time_value` [W], `safety_distance` [m], `mass NAME` [kg] of the
+tool or a part, `x NAME`, `y NAME`, `z NAME` [m], how far a machine or a station is moved in the
+world.
 """
 
 import itertools

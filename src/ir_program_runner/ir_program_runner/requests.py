@@ -1,7 +1,7 @@
 """Requests of a program to driver, planner and machines, one at a time, and their answers.
 
-The program never waits, sends or looks at a clock itself: it yields a request and is sent an
-RequestOutcome.
+The program never waits, sends or looks at a clock itself: it is a generator that yields a request
+and gets a RequestOutcome for it.
 """
 
 from __future__ import annotations

@@ -45,8 +45,8 @@ class CellSignal:
     Where `follows` is given the signal takes its value `delay` [s] after that signal was set (the
     soft PLC's rule), e.g. the door is open 1.5 s after it was asked to. process: the machine whose
     part it reports, "" for none: it is cleared when the followed signal changes, and set when the
-    process that was started by setting that is over. output, input: its numbers
-    at the controller, where the robot sets it and where it reads it, 0: nobody said.
+    process that was started by setting that is over. output, input: its numbers at the controller,
+    where the robot sets it and where it reads it, 0: nobody said.
     """
 
     name: str

@@ -409,9 +409,8 @@ def _check_closed(triangles: FloatArray) -> None:
 
 def _divided(triangles: FloatArray, most: int) -> list[FloatArray]:
     """Corners (V, 3) of at most `most` pieces of a closed mesh (T, 3, 3). Each of its shells is
-    divided by
-    itself, unless one is a hollow: CoACD takes minutes for shells that touch; a convex one is a
-    piece.
+    divided by itself, unless one is a hollow: CoACD takes minutes for shells that touch; a convex
+    one is a piece.
     """
     shells = closed_shells(triangles)
     if len(shells) > most or any(np.linalg.det(shell).sum() <= 0.0 for shell in shells):

@@ -4,8 +4,7 @@ flange.
 Frames: cell (the root, where the base's pose is given), base_link, link_1 .. link_n, flange (the
 last link's frame), tool0 (at the flange, z out), tcp. The root has no inertia, as KDL wants it. A
 capsule is a cylinder with a sphere at each end, because URDF has no capsules. Friction, rotor
-inertia and the counterbalance are
-not part of it: they belong to the drives.
+inertia and the counterbalance are not part of it: they belong to the drives.
 """
 
 from __future__ import annotations

@@ -98,9 +98,9 @@ class RobotModel:
     machine_home (n,) rad: the posture of Table II. rated_payload kg: tool and part together.
     title: maker and model, for people. controller: its power figures. marks: how sure each figure
     is, H, M or L, by its place in the file; estimated: the places of those that a rule estimated.
-    document: the robot file as text; "" for a bundled
-    robot: its name is enough. motor_turns (n, n): what a radian of each joint turns each motor,
-    seen at the motor's own joint; not the identity where the axes of a wrist are coupled.
+    document: the robot file as text; "" for a bundled robot: its name is enough. motor_turns
+    (n, n): what a radian of each joint turns each motor, seen at the motor's own joint; not the
+    identity where the axes of a wrist are coupled.
     rail: the linear unit under the arm, which then is joint 1 and slides: m, m/s, m/s^2, m/s^3, and
     N, kg, N s/m, rad/m, W s^2/m^2 where the others have Nm, kg m^2, Nm s/rad, 1, W s^2/rad^2; None:
     the base stands.

@@ -8,9 +8,9 @@ other, the outermost first, j = i..k+1:
 
 reach_j is the distance of the capsule's axis from joint axis j in the middle: a point that has
 moved by m already is at most reach_j + m away from axis j, which has not moved yet. A rail
-moves every point by as much as itself: m <- m + spread_1. A distance in
-the middle that exceeds threshold + m therefore proves the interval. An interval that is not proved
-is halved, down to a movement of RESOLUTION; the rest is undecided.
+moves every point by as much as itself: m <- m + spread_1. A distance in the middle that exceeds
+threshold + m therefore proves the interval. An interval that is not proved is halved, down to a
+movement of RESOLUTION; the rest is undecided.
 """
 
 from typing import NamedTuple, Protocol

@@ -32,13 +32,12 @@ class Target:
     degrees].
 
     axes: A1..A6 [rad], those that are given; None for a frame. frame: X, Y, Z [mm], A, B, C [deg],
-    those
-    that are given: the rest stays as it is. status, turn: S and T, None where not given. relative:
-    from where the robot stands; in_tool: in the directions of the tool instead of the base's. base,
-    tool: poses (4, 4) [m] of $BASE in the robot's foot and of $TOOL at the flange. external: the
-    tool stands in the cell, at $BASE, and $TOOL is the workpiece at the flange ($IPO_MODE #TCP):
-    the frame is that of the tool in the workpiece. rail: E1 [m] of a robot on a rail, whose foot is
-    then where E1 is 0; None: it stays.
+    those that are given: the rest stays as it is. status, turn: S and T, None where not given.
+    relative: from where the robot stands; in_tool: in the directions of the tool instead of the
+    base's. base, tool: poses (4, 4) [m] of $BASE in the robot's foot and of $TOOL at the flange.
+    external: the tool stands in the cell, at $BASE, and $TOOL is the workpiece at the flange
+    ($IPO_MODE #TCP): the frame is that of the tool in the workpiece. rail: E1 [m] of a robot on a
+    rail, whose foot is then where E1 is 0; None: it stays.
     """
 
     axes: dict[str, float] | None

@@ -96,11 +96,10 @@ class DriverClient:
 
     response_timeout: for services, and to take a goal. silence_timeout: without a reading of the
     meter the driver counts as gone. cancel_timeout: to stop along the path. The meter is read when
-    something is asked
-    of it: a node that waits for nothing is not woken a hundred times a second.
+    something is asked of it: a node that waits for nothing is not woken a hundred times a second.
     timers: those of the controller, None before they came. stops: number of the last stop, and
-    stop_latched: whether it is latched; None before they came. stop_heard: called when a number
-    has come.
+    stop_latched: whether it is latched; None before they came. stop_heard: called when a number has
+    come.
     """
 
     def __init__(
@@ -221,11 +220,10 @@ class DriverClient:
         canceled.
 
         SUCCESS, PREEMPTED when it was stopped along the path, else the driver's code and sentence.
-        The
-        duration is not limited: speed scaling may prolong or hold a movement. cell_hash, load: what
-        it was planned with, "": the driver doesn't compare. station: whose contacts are allowed;
-        states: of machines that the movement relies on; after_stop: the last stop that the caller
-        knows, the driver refuses the movement after a later one.
+        The duration is not limited: speed scaling may prolong or hold a movement. cell_hash, load:
+        what it was planned with, "": the driver doesn't compare. station: whose contacts are
+        allowed; states: of machines that the movement relies on; after_stop: the last stop that the
+        caller knows, the driver refuses the movement after a later one.
         """
         if after_stop is not None:
             states = (*states, f"{STOPS_STATE}={after_stop}")

@@ -2,8 +2,7 @@
 
 For coroutines on a SingleThreadedExecutor. A condition is looked at whenever something arrives
 (`look`) and at least every `period`; time is the steady clock, so a jump of /clock neither ends nor
-prolongs a wait. A
-process that was held up gets that time again: what came meanwhile is not late.
+prolongs a wait. A process that was held up gets that time again: what came meanwhile is not late.
 """
 
 from __future__ import annotations

@@ -43,8 +43,7 @@ def before_after(
     progress: Progress = nobody,
 ) -> BeforeAfter:
     """Today's program against the planner's for the same stops and pauses; cycle_time [s]: what the
-    line
-    needs, 0: nobody said.
+    line needs, 0: nobody said.
 
     Raises RequestError where today's program can't be asked for, and where nothing is found.
     """

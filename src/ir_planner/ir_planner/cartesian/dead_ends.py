@@ -136,8 +136,8 @@ def chains_through(
     layers with these. Raises PathRefusedError where no chain leads on.
 
     Where one leaves the limits in every turn, another one may lead to its end: all turns are looked
-    at. They
-    are too where none leads on from a start beyond half a turn: a limit may be what comes first.
+    at. They are too where none leads on from a start beyond half a turn: a limit may be what comes
+    first.
     """
     scene = asked.context.scene
     fixed = asked.fixed

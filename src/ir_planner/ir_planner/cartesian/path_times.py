@@ -397,8 +397,7 @@ def _between(
     scene: PlanningScene,
 ) -> FloatArray:
     """How far the interpolant leaves the stroke, or the jerk its limit, between points `which` (W,)
-    and the
-    next: 1 is allowed.
+    and the next: 1 is allowed.
     """
     ends = stroke.at(tau)
     inside = tau[which, None] + _INSIDE * np.diff(tau)[which, None]

@@ -50,9 +50,8 @@ class CartesianPlan:
 
     Bounds at every instant: tool_error [m], the tcp's distance from the path; rotation_error [rad],
     its turn against the path there; speed_deviation, the share of the tool's speed that it is off,
-    without approach, retract and changes of speed. lengths (K,) m at
-    which its segments end, counted from the beginning of the approach; configurations: how many
-    were looked at.
+    without approach, retract and changes of speed. lengths (K,) m at which its segments end,
+    counted from the beginning of the approach; configurations: how many were looked at.
     """
 
     status: Status

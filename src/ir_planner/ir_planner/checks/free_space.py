@@ -98,8 +98,9 @@ class FreeSpace:
         return self.scene.collision.certify_edges(q0, q1, self.threshold)
 
     def straight_free(self, q0: FloatArray, q1: FloatArray) -> BoolArray:
-        """Which of the straight movements (N, n) to (N, n) are proved free, also where no work is
-        left: they take what there is of it.
+        """Which of the straight movements (N, n) to (N, n) are proved free.
+
+        All are looked at, however little work is left; what is left of it is spent.
         """
         self.work.spend(min(len(q0), self.work.left))
         return self._proved(q0, q1)
@@ -113,8 +114,10 @@ class FreeSpace:
         return free
 
     def edges_free(self, q0: FloatArray, q1: FloatArray) -> BoolArray:
-        """Which of the straight movements (N, n) to (N, n) are proved free; those are not for which
-        no work is left.
+        """Which of the straight movements (N, n) to (N, n) are proved free.
+
+        Each takes one unit of work. Those for which none is left are not looked at: they count as
+        not free.
         """
         result = np.zeros(len(q0), dtype=bool)
         count = min(len(q0), self.work.left)

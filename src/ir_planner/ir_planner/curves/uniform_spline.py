@@ -2,9 +2,9 @@
 knots.
 
 Three equal control points at an end mean rest there; those of an end in motion follow from its
-state and the interval. Acceleration is linear and jerk constant
-between knots, so a point per knot with position, velocity and acceleration is the motion exactly,
-and its largest values are closed forms.
+state and the interval. Acceleration is linear and jerk constant between knots, so a point per knot
+with position, velocity and acceleration is the motion exactly, and its largest values are closed
+forms.
 """
 
 from dataclasses import dataclass, replace

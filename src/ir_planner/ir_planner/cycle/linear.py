@@ -117,9 +117,9 @@ class LinearProgram:
         first: bool = False,
     ) -> LinearAnswer:
         """The least cost. fixed: values by variable; loose: whole variables that needn't be whole;
-        start: a point to begin with, its whole variables count; stopped: asked in
-        between, the search ends where it says so; gap: relative, at which the search may end;
-        limit: only what costs less is looked for; first: the first point found will do.
+        start: a point to begin with, its whole variables count; stopped: asked in between, the
+        search ends where it says so; gap: relative, at which the search may end; limit: only what
+        costs less is looked for; first: the first point found will do.
         """
         solver = self._empty()
         self._add_rows(solver)

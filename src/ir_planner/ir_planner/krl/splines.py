@@ -411,8 +411,7 @@ _EVEN = 1e-6  # rad: below, the orientation is constant
 @dataclass(frozen=True, eq=False)
 class ToolMotion:
     """Segments from `start` (4, 4) [m] of the tcp in the cell; corner [m]: how far around its end
-    the tool
-    may leave them for the next motion, 0: it passes its end exactly.
+    the tool may leave them for the next motion, 0: it passes its end exactly.
     """
 
     start: FloatArray

@@ -96,9 +96,9 @@ class PlannerAnswers:
     """MoveIt's requests answered by the planner; messages are read and written by their fields.
 
     ask: calls a service of the planner: name, request, timeout [s], and what may cancel it;
-    CallGivenUpError ends it then. state: the joints (n,) where
-    the robot is, for these names. report: takes the planner's report of a movement, its start state
-    and its trajectory. contact: makes a ContactInformation.
+    CallGivenUpError ends it then. state: the joints (n,) where the robot is, for these names.
+    report: takes the planner's report of a movement, its start state and its trajectory. contact:
+    makes a ContactInformation.
     """
 
     def __init__(

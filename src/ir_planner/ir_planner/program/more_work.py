@@ -111,8 +111,7 @@ def _first(
     request: ProgramRequest, route: Route, context: Context, progress: Progress
 ) -> ChainAnswer:
     """The first program. A cycle time that is too short along the cheapest chain may do along that
-    of the
-    fastest program: what one objective can do is refused by none.
+    of the fastest program: what one objective can do is refused by none.
     """
     try:
         return planned(chosen(request, route, context, progress), progress)

@@ -128,9 +128,8 @@ class Ladder:
     def _searched(self, rung: int) -> tuple[Movements, ...]:
         """Searched movements, of the nearest value first, from which those of a rung are optimised;
         none where these are searched. They are the same for every cycle time, so that a longer one
-        knows what a
-        shorter one does: the local minimum of one value may be better at another than that one's
-        own.
+        knows what a shorter one does: the local minimum of one value may be better at another than
+        that one's own.
         """
         places: dict[float, Movements | None] = {FASTEST: None}
         if abs(_MIDDLE - self._place) >= _REACH:

@@ -72,8 +72,8 @@ def mapped(
     """task(item, context of its own) for every item, in order; what each did is added to
     `context`'s journal.
 
-    improvement: work of each for better answers; most: of each at all. Raises
-    what the first failing task raises, CancelledError when asked to stop.
+    improvement: work of each for better answers; most: of each at all. Raises what the first
+    failing task raises, CancelledError when asked to stop.
     """
     contexts = [_own(context, improvement, edges) for edges in most]
     count = min(context.work.threads or len(os.sched_getaffinity(0)), len(items))
@@ -195,9 +195,8 @@ class Movements:
     def _shared(self, parts: list[HopPart], improvement: int) -> list[Movement | Failure]:
         """Movements of parts that share the work left: all the same, but those along service lines,
         which are known without any, no more than if the whole program was still to plan. What isn't
-        found with its
-        share gets the work that the others left: at least half of their shares, which isn't for
-        improvement.
+        found with its share gets the work that the others left: at least half of their shares,
+        which isn't for improvement.
         """
         left = self.context.work.left
         of_one = left // max(len(parts), 1)

@@ -142,10 +142,11 @@ def improve(
 def _refined_first(
     ends: Ends, paths: list[Path], portfolio: Portfolio, *, guided: bool, more: Callable[[], bool]
 ) -> str:
-    """Optimise the first paths and, where `guided` while there is more work, guesses; refine the
-    best. A note what came of it. Guesses alone lead to movements as good as those with the first
-    path of a search beside them: where it isn't straight it counts where none of them is certified,
-    or a duration is requested.
+    """Optimise the first paths and guesses, and refine the best; a note what came of it.
+
+    guided: guesses too, while there is more work. They alone lead to movements as good as with a
+    first path that isn't straight. So that path is set aside, unless a duration is requested, until
+    it turns out that none of them is certified.
     """
     requested = portfolio.context.options.duration > 0.0
     straight = any(len(path) == 2 for _, path in paths)

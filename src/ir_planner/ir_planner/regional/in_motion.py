@@ -5,8 +5,7 @@ limit, or that goes on getting faster than it may while its acceleration falls, 
 the axis, the value and the bound. Then movements come from three sources, and the cheapest
 certified one is the answer: descents with the given motion at the ends, along free paths and
 guesses; the stop and go around it (braking, a movement from rest to rest, getting up to speed); and
-the descent from that one. So no answer costs more than that stop
-and go.
+the descent from that one. So no answer costs more than that stop and go.
 """
 
 from dataclasses import dataclass, replace
@@ -77,8 +76,7 @@ def search_in_motion(
     searches: Searches,
 ) -> tuple[Status, Movement | None]:
     """The cheapest movement found with the context's motion at its ends, start (n,), goals (G, n),
-    or why there is none. Raises RequestError for ends from
-    which limits can't be kept.
+    or why there is none. Raises RequestError for ends from which limits can't be kept.
     """
     assert context.motion is not None
     begin, end = moving_ends(start, goals[0], context.motion)

@@ -3,8 +3,8 @@
 A barrier: one joint would have to pass a value at which two links of the robot, or the link that
 it alone moves and a body, are too near, whatever the other joints do. An enclosure: a ball within
 the robot or its load would have to pass where it doesn't fit; walls that enclose an end, or that
-part the arm's reach, are recognised. A request that isn't
-recognised may still be impossible: only single balls and joints are followed.
+part the arm's reach, are recognised. A request that isn't recognised may still be impossible: only
+single balls and joints are followed.
 """
 
 from __future__ import annotations

@@ -198,10 +198,9 @@ def tool_bounds_of(options: PlanOptions, scene: PlanningScene, station: str = ""
 @dataclass(frozen=True, eq=False)
 class Context:
     """scene: where the robot moves. options: as they were checked, with the robot's own price of a
-    second where none was given. journal: what happened so far;
-    it counts the work. station: whose allowed contacts hold in its zone; "": nobody's. motion (2,
-    2, n): qd, qdd at the start and at the goal of a movement that isn't at rest at both; None: it
-    is.
+    second where none was given. journal: what happened so far; it counts the work. station: whose
+    allowed contacts hold in its zone; "": nobody's. motion (2, 2, n): qd, qdd at the start and at
+    the goal of a movement that isn't at rest at both; None: it is.
     """
 
     scene: PlanningScene

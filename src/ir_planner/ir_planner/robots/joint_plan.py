@@ -74,11 +74,11 @@ class SharedZone:
 class RobotsPlan:
     """programs: one cycle of each of `robots`, from the stop before its first movement on; begins
     [s]: when that is, in the cycle of the first robot; leads: the pause of each until then, from
-    the earliest of these on; period [s]; fastest [s]: the shortest that
-    is possible. joules of all in a cycle; full_speed [J]: of the same zones with all movements as
-    fast as they can and motors on in every wait. gap [%]: how far joules can be above the least for
-    these configurations, zones and curves. peak_power [W]: no shift of the robots needs more.
-    proved: pairs of movements and stops that are free of each other at every relative timing.
+    the earliest of these on; period [s]; fastest [s]: the shortest that is possible. joules of all
+    in a cycle; full_speed [J]: of the same zones with all movements as fast as they can and motors
+    on in every wait. gap [%]: how far joules can be above the least for these configurations, zones
+    and curves. peak_power [W]: no shift of the robots needs more. proved: pairs of movements and
+    stops that are free of each other at every relative timing.
     """
 
     status: Status

@@ -37,8 +37,7 @@ class Plateau:
 
     payload [kg]: mass of the load. expected [W]: by the data of controller, tool and robot. table_2
     [W]: the paper's value, NaN where the load is another one. low, high [W]: the 90 % interval of
-    what is
-    expected, of a robot that holds itself: drives draw more than the data know. NaN: none.
+    what is expected, of a robot that holds itself: drives draw more than the data know. NaN: none.
     """
 
     mode: str

@@ -94,11 +94,11 @@ class StepResult:
     [J] at the DC bus; peak_power [W];
     indirect_energy [J]: from recorded positions alone; torque_energy [J]: from recorded speed and
     torque; second_opinion [J]: from positions with torques by Pinocchio, where it is installed;
-    stored_energy [J]: in the capacitors at the
-    start; lost_charge [J]: that the plan counted on in them, and that had gone as the step began
-    late; slip [s]: by which the plant's time slipped against the recorder's clock; motors_power
-    [W]: at rest with motors on, by the data; tool_deviation [m]: largest between
-    commanded and simulated tcp. NaN where it wasn't recorded. clearance is None for pauses.
+    stored_energy [J]: in the capacitors at the start; lost_charge [J]: that the plan counted on in
+    them, and that had gone as the step began late; slip [s]: by which the plant's time slipped
+    against the recorder's clock; motors_power [W]: at rest with motors on, by the data;
+    tool_deviation [m]: largest between commanded and simulated tcp. NaN where it wasn't recorded.
+    clearance is None for pauses.
     """
 
     step: ExecutedStep

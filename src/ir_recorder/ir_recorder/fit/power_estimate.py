@@ -123,10 +123,10 @@ def widening(
 ) -> float:
     """The least factor, 1 or more, on the variance of the noise that explains the stretches, else
     the likeliest. Movements and rests are explained each: many rests, which are easy, say nothing
-    of how well movements are known. slopes (R, P) and residual (R,)
-    are weighted by it, fold (R,) says what is left out together, pull (P, P) is the prior's
-    precision, deviation (P,) its deviations. stay: the parameters are those of the weights that
-    are given, only what is said of their uncertainty takes the factor.
+    of how well movements are known. slopes (R, P) and residual (R,) are weighted by it, fold (R,)
+    says what is left out together, pull (P, P) is the prior's precision, deviation (P,) its
+    deviations. stay: the parameters are those of the weights that are given, only what is said of
+    their uncertainty takes the factor.
     """
     parts = [
         (own.T @ own, own.T @ residual[fold == k])

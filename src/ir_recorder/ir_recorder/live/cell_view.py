@@ -35,10 +35,10 @@ MOST_STEPS = 2_000
 class ReceivedCell:
     """What was heard last.
 
-    cell: the text of its file; states: machine and state, "shut>open" while it
-    changes; joints, q: names and values (n,) [rad], None while
-    none are heard; load: what is carried; movement: the step that runs; ended: steps since the last
-    look, None among them where a program begins; path: what is or will be driven.
+    cell: the text of its file; states: machine and state, "shut>open" while it changes; joints, q:
+    names and values (n,) [rad], None while none are heard; load: what is carried; movement: the
+    step that runs; ended: steps since the last look, None among them where a program begins; path:
+    what is or will be driven.
     """
 
     cell: str = ""

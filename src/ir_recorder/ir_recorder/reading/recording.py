@@ -158,10 +158,10 @@ class Recording:
     plant_yaml (the simulated plant with its figures). facts: texts by key. planned: steps of the
     last planned program, where nothing was driven; planned_interval [J]: of its energy, 90 %, None
     where its answer has none; planned_certified: whether its answer is proved. machines: their
-    states by name, "closed>open"
-    while they change; contacts: what the robot touched, by body. savings: of the driven programs,
-    or of the last planned one, where their plans are in it. searches: what the searches of the
-    driven programs did, or of the last planned one where none was driven, where they keep a log.
+    states by name, "closed>open" while they change; contacts: what the robot touched, by body.
+    savings: of the driven programs, or of the last planned one, where their plans are in it.
+    searches: what the searches of the driven programs did, or of the last planned one where none
+    was driven, where they keep a log.
     """
 
     path: Path

@@ -440,8 +440,7 @@ class PathPiece(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Keep:
     """Distances (Z,) [m] that the pairs of a scene must keep outside the zone of a station, and
-    inside; ""
-    and None: there is no such station.
+    inside; "" and None: there is no such station.
     """
 
     scene: ContactScene

@@ -90,8 +90,8 @@ class Pauses:
     """PROFIenergy's commands on the power modes.
 
     wants_motors: a pause was ended, motors are asked for. power: watts at the mains in a mode with
-    the present load and posture; pe_ids: PROFIenergy's numbers; charging: J for
-    the DC link after a time without the drive bus.
+    the present load and posture; pe_ids: PROFIenergy's numbers; charging: J for the DC link after a
+    time without the drive bus.
     """
 
     def __init__(

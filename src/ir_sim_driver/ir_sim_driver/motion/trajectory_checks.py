@@ -274,10 +274,8 @@ def route_onto(
     """Path from the commanded motion `now` onto and along the trajectory that is executed.
 
     acceleration_max (n,) [rad/s^2]. delay [s]: until time 0 of the trajectory, below 0 since; a
-    robot at rest
-    waits for it.
-    share: of acceleration_max, that closing the last difference may use; anything else has its time
-    given. Raises TrajectoryRefusedError.
+    robot at rest waits for it. share: of acceleration_max, that closing the last difference may
+    use; anything else has its time given. Raises TrajectoryRefusedError.
     """
     moving = bool(now.qd.any())
     late = max(0.0, -delay) if settings.join_late else 0.0

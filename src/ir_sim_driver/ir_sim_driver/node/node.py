@@ -125,9 +125,7 @@ class SimDriver(Node):
         return self._links[link].port if link in self._links else 0
 
     def destroy_node(self) -> None:
-        """Stop the plant, then the rest. Raises DriverError when the plant had ended
-        before.
-        """
+        """Stop the plant, then the rest. Raises DriverError when the plant had ended before."""
         for thread in self._threads:
             thread.close()
         for each in (self._inputs, self._recoveries, self._presses, self._requests):

@@ -39,8 +39,8 @@ class ClockPolicy:
 
 SYSTEM = ClockPolicy(gap=2.0, lag=inf, catch_up=2.0)
 """The host's clock: a loaded machine lags as long as it is loaded. Two seconds without a look at
-the clock
-are no load: its threads wait for tenths of one, and for a whole one while a huge message is read.
+the clock are no load: its threads wait for tenths of one, and for a whole one while a huge message
+is read.
 """
 FOREIGN = ClockPolicy(gap=5.0, lag=5.0, catch_up=inf)
 """Somebody's /clock, which comes in steps and at any speed."""

@@ -75,9 +75,9 @@ class MeterReading:
     time [s], energy [J] at the mains: of base_energy (tool_energy is a part of it), axis_energy
     (n,), burnt_energy, bled_energy (in the bleed resistors), capacitor_energy and rectifier_energy
     (the precharge resistor's is a part of it). axis_energy is made of mechanical_energy,
-    copper_energy, inverter_energy and iron_energy, each (n,). base_power,
-    tool_power [W], bus_voltage [V], joint_power (n,) [W], joint_torque (n,) [Nm], joint_current
-    (n,) [A rms] of the last step.
+    copper_energy, inverter_energy and iron_energy, each (n,). base_power, tool_power [W],
+    bus_voltage [V], joint_power (n,) [W], joint_torque (n,) [Nm], joint_current (n,) [A rms] of the
+    last step.
     """
 
     time: float

@@ -97,8 +97,7 @@ def _merged(
 
 def _thick(moments: FloatArray) -> FloatArray:
     """Principal moments (3,), rising, that Bullet does not take for impossible by rounding, and for
-    zero
-    then: a flat disc fulfils their triangle inequality with equality.
+    zero then: a flat disc fulfils their triangle inequality with equality.
     """
     if moments[0] + moments[1] - moments[2] > _THICKNESS * moments[2]:
         return moments

@@ -1,13 +1,11 @@
 """The search for the best placements: a look at many, full plans where they could be the best.
 
 A look costs a sixth of a plan and estimates its cost but for what stands in between. The least
-difference of
-cost and estimate that was seen, less a margin, makes it a bound: what can't be the best by it is
-not planned. That bound follows from what was seen; it is no proof. In a cycle time joules count,
-which are not what J at a
-fixed price of time says: there the line through what was planned takes the place of the difference.
-Everything goes on in rounds and batches of fixed size, so that the same settings give the same
-placements, however many processes make the jobs.
+difference of cost and estimate that was seen, less a margin, makes it a bound: what can't be the
+best by it is not planned. That bound follows from what was seen; it is no proof. In a cycle time
+joules count, which are not what J at a fixed price of time says: there the line through what was
+planned takes the place of the difference. Everything goes on in rounds and batches of fixed size,
+so that the same settings give the same placements, however many processes make the jobs.
 """
 
 from __future__ import annotations
