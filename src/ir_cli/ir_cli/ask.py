@@ -122,7 +122,8 @@ def run_escape(arguments: argparse.Namespace) -> int:
         write_trace(arguments.output, plan.trajectory)
     if arguments.json:
         gained = [
-            {**_row(pair), "left": left} for pair, left in zip(plan.pairs, plan.left, strict=True)
+            {**_pair_row(pair), "left": left}
+            for pair, left in zip(plan.pairs, plan.left, strict=True)
         ]
         figures = {**figures_of(plan.report), "waypoints": plan.waypoints, "pairs": gained}
         print_json({"trajectory_id": plan.trajectory.trajectory_id, **figures})
@@ -324,7 +325,7 @@ def run_check(arguments: argparse.Namespace) -> int:
             load=load,
             station=arguments.station,
         )
-    rows = [_row(pair) for pair in found.pairs]
+    rows = [_pair_row(pair) for pair in found.pairs]
     if arguments.json:
         print_json({"valid": found.valid, "min_distance": found.min_distance, "pairs": rows})
     elif arguments.csv:
@@ -338,7 +339,8 @@ def run_check(arguments: argparse.Namespace) -> int:
     return 0 if found.valid else FAILED
 
 
-def _row(pair: DistancePair) -> Row:
+def _pair_row(pair: DistancePair) -> Row:
+    """A pair as a row of the answer."""
     return {
         "body_a": pair.body_a,
         "body_b": pair.body_b,

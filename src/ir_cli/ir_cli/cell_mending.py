@@ -146,7 +146,7 @@ def zone_yaml(machine: Equipment) -> str:
     """A line to paste into a machine."""
     zone = machine.zone_in_equipment
     turned = "" if np.array_equal(zone.pose[:3, :3], np.eye(3)) else _rotation(zone.pose[:3, :3])
-    box = f"size: [{_row(zone.size)}], xyz: [{_row(zone.pose[:3, 3])}]"
+    box = f"size: [{_numbers_text(zone.size)}], xyz: [{_numbers_text(zone.pose[:3, 3])}]"
     return f"zone: {{kind: {zone.kind}, {box}{turned}}}"
 
 
@@ -155,7 +155,8 @@ def _rotation(rotation: FloatArray) -> str:
     return f", rotation: [{rows}]"
 
 
-def _row(values: FloatArray) -> str:
+def _numbers_text(values: FloatArray) -> str:
+    """Numbers of a cell file, to six digits after the point."""
     return ", ".join(f"{value + 0.0:g}" for value in np.round(values, 6))
 
 
@@ -179,7 +180,7 @@ def suggestions_of(cell: Cell) -> Iterator[Suggestion]:
     """What to change at stations and machines, then what fails when that has been done."""
     mended, suggestions = mended_cell(cell)
     yield from suggestions
-    yield from _planned(mended)
+    yield from _planner_suggestions(mended)
 
 
 def mended_cell(cell: Cell) -> tuple[Cell, list[Suggestion]]:
@@ -306,7 +307,7 @@ def _with_zone(cell: Cell, name: str, best: SuggestedExit) -> Cell:
     return changed_machine(cell, with_zone(machine, places))
 
 
-def _planned(cell: Cell) -> Iterator[Suggestion]:
+def _planner_suggestions(cell: Cell) -> Iterator[Suggestion]:
     """What the planner refuses: the program, and stations where it does not go, from park and
     back.
     """

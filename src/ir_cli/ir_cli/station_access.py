@@ -106,10 +106,11 @@ def stations_of(cell: Cell) -> list[Row]:
     """One row per situation at a station: configurations that reach it, how many of them keep 20 mm
     (or what the station allows), the best clearance, and the obstructing pairs where none does.
     """
-    return [_row(visit, cell) for visit in visits(cell)]
+    return [_access_row(visit, cell) for visit in visits(cell)]
 
 
-def _row(visit: StationVisit, cell: Cell) -> Row:
+def _access_row(visit: StationVisit, cell: Cell) -> Row:
+    """How many configurations of a visit are free, the best clearance [m], or what obstructs."""
     station = visit.station
     scene = visit.scene
     threshold = scene.thresholds(DEFAULT_SAFETY_DISTANCE, station.name)

@@ -231,7 +231,7 @@ def _sentences(plan: SteadyPlan) -> list[str]:
     lines = [
         f"order: a part from {', '.join(totals['order'])}, each to the next station of the route",
         f"{totals['parts_per_hour']:.2f} parts an hour, a cycle of {totals['period']:.2f} s for "
-        f"{_parts(totals['units'])} (the shortest: {totals['fastest_period']:.2f} s a part)",
+        f"{_parts_text(totals['units'])} (the shortest: {totals['fastest_period']:.2f} s a part)",
         f"{totals['joules'] / 1e3:.2f} kJ a part from the mains, {_proved(plan, totals)}",
         f"at most {totals['gap']:.2f} % above the cheapest cycle of these configurations, without "
         "what the capacitor carries from one movement to the next",
@@ -249,7 +249,7 @@ def _sentences(plan: SteadyPlan) -> list[str]:
     return lines
 
 
-def _parts(count: int) -> str:
+def _parts_text(count: int) -> str:
     return "a part" if count == 1 else f"{count} parts"
 
 

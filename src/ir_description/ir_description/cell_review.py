@@ -48,7 +48,7 @@ def check_cell(cell: Cell, power: PowerData | None = None) -> tuple[CellFinding,
         *_zones(cell),
         *_signals(cell),
         *_pauses(cell, power or cell.robot.controller),
-        *_parts(cell),
+        *_part_findings(cell),
         *_processes(cell),
     ]
     return tuple(sorted(findings, key=lambda finding: finding.severity))
@@ -306,7 +306,8 @@ def _pauses(cell: Cell, power: PowerData) -> Iterator[CellFinding]:
             )
 
 
-def _parts(cell: Cell) -> Iterator[CellFinding]:
+def _part_findings(cell: Cell) -> Iterator[CellFinding]:
+    """A part that is still held at the end."""
     state = cell.parts_at_start()
     for step in cell.program:
         state = state.after(step)

@@ -73,7 +73,7 @@ class BidirectionalTree:
             ("start_line", line),
             *((f"goal_lines[{g}]", rows) for g, rows in enumerate(lines)),
         ):
-            _within(name, rows, least, most)
+            _check_within(name, rows, least, most)
         free = collision.is_free(np.concatenate([first[None], last]), limits)
         if not free[0]:
             raise KernelError("start is not free: a pair is not farther apart than its threshold")
@@ -155,7 +155,7 @@ def _line(name: str, value: ArrayLike, n: int) -> FloatArray:
     return np.empty((0, n)) if rows.shape == (0, n) else checked(name, value, None, n)
 
 
-def _within(name: str, rows: FloatArray, low: FloatArray, high: FloatArray) -> None:
+def _check_within(name: str, rows: FloatArray, low: FloatArray, high: FloatArray) -> None:
     """Raise KernelError for configurations (M, n) outside the limits."""
     outside = np.argwhere((rows < low) | (rows > high))
     if len(outside):

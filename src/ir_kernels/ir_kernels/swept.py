@@ -71,7 +71,7 @@ class SweptArm:
         self._right = np.full(len(c), -1)
         self.segments = np.zeros((0, len(self.capsules.link), 2, 3))
         self.moved = np.zeros((0, len(self.capsules.link)))
-        self._look_at(*self._parts(0))
+        self._look_at(*self._middles_and_spreads(0))
         self.root = self._joined()
 
     @staticmethod
@@ -106,7 +106,7 @@ class SweptArm:
             self._append(
                 np.tile(rows, 2), np.concatenate([low, middle]), np.concatenate([middle, high])
             )
-            self._look_at(*self._parts(first))
+            self._look_at(*self._middles_and_spreads(first))
         return self._left[pieces], self._right[pieces]
 
     def _append(self, rows: IntArray, low: FloatArray, high: FloatArray) -> None:
@@ -117,7 +117,7 @@ class SweptArm:
         self._left = np.concatenate([self._left, none])
         self._right = np.concatenate([self._right, none])
 
-    def _parts(self, first: int) -> tuple[FloatArray, FloatArray]:
+    def _middles_and_spreads(self, first: int) -> tuple[FloatArray, FloatArray]:
         """Joint values in the middle of the pieces from `first` on, and how far they are from
         there within these, (N, n) each.
         """
@@ -129,7 +129,7 @@ class SweptArm:
     def _joined(self) -> int:
         """Pieces of several segments, up to the whole movement; the number of that one."""
         pieces = np.arange(len(self._rows))
-        q, spread = self._parts(0)
+        q, spread = self._middles_and_spreads(0)
         low = q - spread
         high = q + spread
         while len(pieces) > 1:

@@ -59,7 +59,7 @@ _WAIT = re.compile(
 )
 
 
-def _turned(rows: FloatArray, sign: float) -> FloatArray:
+def _quarter_turned(rows: FloatArray, sign: float) -> FloatArray:
     """A pose (4, 4) or a place (3,) turned a quarter about z, from a UR's flange to KUKA's (1.0) or
     back (-1.0).
     """
@@ -308,7 +308,7 @@ class _Script:
         if not isinstance(value, _Pose) or len(value.values) != 6:
             raise KrlRunError("set_tcp takes a pose p[...]", place)
         turn = rotation_from_vector(np.array(value.values[3:]))
-        self._tool = _turned(pose_of(value.values[:3], turn), 1.0)
+        self._tool = _quarter_turned(pose_of(value.values[:3], turn), 1.0)
 
     def _set_payload(self, call: ast.Call, place: SourcePlace) -> None:
         given = self._given(call, ("m", "cog", "inertia"), place)
@@ -320,7 +320,7 @@ class _Script:
             raise KrlRunError("cog and inertia are lists of numbers", place)
         if len(centre) != 3 or len(moments) != 6 or any(moments[3:]):
             raise KrlRunError("cog has 3 numbers, inertia 6, of which products must be 0", place)
-        x, y, z = (float(one) for one in _turned(np.array(centre), 1.0))
+        x, y, z = (float(one) for one in _quarter_turned(np.array(centre), 1.0))
         turned = (90.0, 0.0, 0.0)
         about = (float(moments[0]), float(moments[1]), float(moments[2]))
         self._payload = Payload(self._number(given["m"], place), (x, y, z), turned, about)
@@ -408,7 +408,7 @@ class _Writer:
 
 def payload_line(load: Payload) -> str:
     """What is carried; its products of inertia are left out."""
-    x, y, z = _turned(np.array(load.centre), -1.0)
+    x, y, z = _quarter_turned(np.array(load.centre), -1.0)
     return f"set_payload({load.mass:.4f}, [{x:.6f}, {y:.6f}, {z:.6f}])"
 
 
@@ -431,7 +431,7 @@ def written_urscript(
     first = ", ".join(f"{one:.9f}" for one in start)
 
     def texts(lines: Sequence[str]) -> Texts:
-        tcp = _turned(attached.tool, -1.0)
+        tcp = _quarter_turned(attached.tool, -1.0)
         body = [
             f"set_tcp({_pose(tcp)})",
             payload_line(attached.loads[0]),

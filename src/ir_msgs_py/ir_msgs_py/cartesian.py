@@ -35,7 +35,8 @@ _RIGID = 1e-6  # of a rotation
 _POSES = {LINE: (1, 1), CIRCLE: (2, 2), SPLINE: (1, POSES_MAX)}
 
 
-def _within(value: float, low: float, high: float, name: str, unit: str = "") -> float:
+def _checked_within(value: float, low: float, high: float, name: str, unit: str = "") -> float:
+    """A number that lies in a range. Raises InvalidValueError."""
     number = finite(value, name, unit)
     if not low <= number <= high:
         suffix = f" {unit}" if unit else ""
@@ -90,7 +91,7 @@ class CartesianSegment:
             set_field(
                 self,
                 "tool_speed",
-                _within(self.tool_speed, SPEED_MIN, SPEED_MAX, "tool_speed", "m/s"),
+                _checked_within(self.tool_speed, SPEED_MIN, SPEED_MAX, "tool_speed", "m/s"),
             )
         set_field(self, "rotation_speed", _rotation_speed(self.rotation_speed))
 
@@ -99,7 +100,7 @@ def _rotation_speed(value: float) -> float:
     """A speed [rad/s], or 0 where none is asked for."""
     if value == 0.0:
         return 0.0
-    return _within(value, ROTATION_SPEED_MIN, ROTATION_SPEED_MAX, "rotation_speed", "rad/s")
+    return _checked_within(value, ROTATION_SPEED_MIN, ROTATION_SPEED_MAX, "rotation_speed", "rad/s")
 
 
 @typed_methods(InvalidValueError)
@@ -141,7 +142,7 @@ class CartesianPath:
             ("approach", 0.0, LENGTH_MAX, "m"),
             ("retract", 0.0, LENGTH_MAX, "m"),
         ):
-            set_field(self, name, _within(getattr(self, name), low, high, name, unit))
+            set_field(self, name, _checked_within(getattr(self, name), low, high, name, unit))
         set_field(self, "rotation_speed", _rotation_speed(self.rotation_speed))
         turns = [self.rotation_speed, *(segment.rotation_speed for segment in self.segments)]
         if self.orientation == TANGENT and any(turns):

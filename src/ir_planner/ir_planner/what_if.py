@@ -67,15 +67,17 @@ def what_if(
         _changed(base, name, 0.0, look=True)
     job = cell_to_yaml(base), options or PlanOptions(), stations
     if workers == 1:
-        return [_row(base, change, *job[1:]) for change in changes]
+        return [_planned_row(base, change, *job[1:]) for change in changes]
     shares = [changes[k::workers] for k in range(min(workers, len(changes)))]
     with ThreadPoolExecutor(len(shares)) as pool:  # each waits for a process
-        found = list(pool.map(lambda share: _apart(job, share), shares))
+        found = list(pool.map(lambda share: _rows_by_process(job, share), shares))
     rows = itertools.chain.from_iterable(itertools.zip_longest(*found))
     return [row for row in rows if row is not None]
 
 
-def _row(base: Cell, change: Change, options: PlanOptions, stations: tuple[str, ...]) -> Row:
+def _planned_row(
+    base: Cell, change: Change, options: PlanOptions, stations: tuple[str, ...]
+) -> Row:
     """Plan with the values of one row."""
     # work is counted: the same rows on any machine
     planner = Planner(clock=itertools.repeat(0.0).__next__)
@@ -159,7 +161,9 @@ def _moved(cell: Cell, name: str, by: FloatArray) -> Cell:
     raise unknown_name("machine or station", name, known)
 
 
-def _apart(job: tuple[str, PlanOptions, tuple[str, ...]], share: Sequence[Change]) -> list[Row]:
+def _rows_by_process(
+    job: tuple[str, PlanOptions, tuple[str, ...]], share: Sequence[Change]
+) -> list[Row]:
     """Rows of a share of the changes, planned in a process of its own."""
     process = subprocess.run(
         [sys.executable, "-c", f"from {__name__} import main; main()"],
@@ -175,5 +179,5 @@ def main() -> None:
     """Plan the rows that standard input asks for, and write them to standard output."""
     (text, options, stations), share = pickle.load(sys.stdin.buffer)
     base = cell_from_yaml(text)
-    rows = [_row(base, change, options, stations) for change in share]
+    rows = [_planned_row(base, change, options, stations) for change in share]
     sys.stdout.buffer.write(pickle.dumps(rows))

@@ -80,8 +80,8 @@ class DemoOutcome:
             self._movements(),
             self._at_rest(),
             self._cycle(),
-            self._parts(),
-            self._saved(),
+            self._parts_text(),
+            self._savings_text(),
             *self.analysis.problems,
         ]
         parts += check_lines(self.checks)
@@ -103,7 +103,7 @@ class DemoOutcome:
                 lines.append(f"    {computed_words(cycle)}")
         return "\n".join(lines)
 
-    def _parts(self) -> str:
+    def _parts_text(self) -> str:
         """What each part of a route took, and who waited for whom."""
         tending = self.analysis.tending
         if tending is None:
@@ -131,7 +131,7 @@ class DemoOutcome:
         ]
         return table(header, rows)
 
-    def _saved(self) -> str:
+    def _savings_text(self) -> str:
         """What the program saves by its plan, each figure with its baseline."""
         return "\n".join(savings_lines(self.analysis))
 

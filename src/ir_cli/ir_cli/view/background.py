@@ -205,7 +205,7 @@ class PlanWorker:
             if not plan.status.ok:
                 return Planned(None, failure=plan.status.message)
             others = sentences_of(plan, planner)[2:-1]  # totals are figures; the saving: compared
-            lines = (_parts(plan.movements), *others)
+            lines = (_parts_line(plan.movements), *others)
             return Planned(motion_of(plan.movements, cell), lines, report=plan.report)
         movements = []
         failures = []
@@ -269,7 +269,7 @@ def _raise(error: BaseException) -> None:
     raise error
 
 
-def _parts(steps: Sequence[PlannedMovement]) -> str:
+def _parts_line(steps: Sequence[PlannedMovement]) -> str:
     """Time and energy of the movements and of the pauses, in the units of the page."""
     shares = [planned_share(steps, part) for part in ("movements", "pauses")]
     return "; ".join(

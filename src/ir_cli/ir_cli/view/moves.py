@@ -154,9 +154,9 @@ def _changes(
             for item, value in zip(xyz.value, after[:3, 3], strict=True):
                 yield _start(item), _end(item), _number(float(value))
         else:
-            yield _after(pose, f"xyz: {_row(after[:3, 3], None)}", -1)
+            yield _after(pose, f"xyz: {_list_text(after[:3, 3], None)}", -1)
     if not np.array_equal(before[:3, :3], after[:3, :3]):
-        turn = f"abc_deg: {_row(abc_from_rotation(after[:3, :3]), TENTH)}"
+        turn = f"abc_deg: {_list_text(abc_from_rotation(after[:3, :3]), TENTH)}"
         for key, value in pose.value:
             if key.value in _TURNS:
                 yield _start(key), _end(value), turn
@@ -201,13 +201,13 @@ def _scalar(node: yaml.Node | None) -> str:
 
 
 def _pose_text(pose: FloatArray) -> str:
-    xyz = f"xyz: {_row(pose[:3, 3], None)}"
+    xyz = f"xyz: {_list_text(pose[:3, 3], None)}"
     if np.array_equal(pose[:3, :3], np.eye(3)):
         return xyz
-    return f"{xyz}, abc_deg: {_row(abc_from_rotation(pose[:3, :3]), TENTH)}"
+    return f"{xyz}, abc_deg: {_list_text(abc_from_rotation(pose[:3, :3]), TENTH)}"
 
 
-def _row(values: FloatArray, digits: int | None) -> str:
+def _list_text(values: FloatArray, digits: int | None) -> str:
     """Numbers as people write them; without digits the shortest that give the same."""
     rounded = [float(value) if digits is None else round(float(value), digits) for value in values]
     return f"[{', '.join(map(_number, rounded))}]"

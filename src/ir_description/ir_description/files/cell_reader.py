@@ -222,7 +222,7 @@ class _CellReader:
         base_pose = _pose(table.get("base"))
         tcp = _pose(table.get("tcp"))
         tool = self._tool()
-        parts = self._parts(tool)
+        parts = self._read_parts(tool)
         equipment, placed = self._equipment()
         stations = tuple(entry.station for entry in placed)
         self._check_part_stations(parts, stations)
@@ -276,7 +276,7 @@ class _CellReader:
         self._capsules += self._tool_names
         return tool
 
-    def _parts(self, tool: Load | None) -> tuple[Part, ...]:
+    def _read_parts(self, tool: Load | None) -> tuple[Part, ...]:
         names = NameRegister("part")
         parts = []
         for item in self._list("parts", 1000):

@@ -79,7 +79,11 @@ def _cell(cell: Cell) -> Iterator[str]:
     yield from _block(
         "tasks",
         (
-            [f"name: {_quoted(t.name)}", f"start: {_row(t.start)}", f"goal: {_row(t.goal)}"]
+            [
+                f"name: {_quoted(t.name)}",
+                f"start: {_list_text(t.start)}",
+                f"goal: {_list_text(t.goal)}",
+            ]
             for t in cell.tasks
         ),
     )
@@ -91,9 +95,9 @@ def _cell(cell: Cell) -> Iterator[str]:
 def _load(load: Load) -> Iterator[str]:
     yield f"name: {load.name}"
     yield f"mass: {_number(load.mass)}"
-    yield f"com: {_row(load.com)}"
+    yield f"com: {_list_text(load.com)}"
     J = load.inertia
-    yield f"inertia: {_row((J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]))}"
+    yield f"inertia: {_list_text((J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]))}"
     if load.kind == "tool":
         yield f"watts_always: {_number(load.watts_always)}"
         yield f"watts_drive_bus: {_number(load.watts_drive_bus)}"
@@ -114,8 +118,8 @@ def _limits(limits: ToolLimits) -> Iterator[str]:
 
 
 def _capsule(capsule: Capsule) -> str:
-    p0 = _row(capsule.p0)
-    p1 = _row(capsule.p1)
+    p0 = _list_text(capsule.p0)
+    p1 = _list_text(capsule.p1)
     return f"{{name: {capsule.name}, p0: {p0}, p1: {p1}, radius: {_number(capsule.radius)}}}"
 
 
@@ -174,17 +178,17 @@ def _zone(machine: Equipment, stations: Iterable[Station]) -> str:
     zone = machine.zone_in_equipment
     if machine.has_default_zone(stations):
         return f"zone: {zone.kind}"
-    return f"zone: {{kind: {zone.kind}, size: {_row(zone.size)}, {_pose(zone.pose)}}}"
+    return f"zone: {{kind: {zone.kind}, size: {_list_text(zone.size)}, {_pose(zone.pose)}}}"
 
 
 def _body(body: Body) -> str:
     shape = {
-        "box": f", size: {_row(body.size)}",
+        "box": f", size: {_list_text(body.size)}",
         "cylinder": f", radius: {_number(body.size[0])}, length: {_number(body.size[1])}",
         "sphere": f", radius: {_number(body.size[0])}",
         "capsule": f", radius: {_number(body.size[0])}, length: {_number(body.size[1])}",
         "plane": "",
-        "mesh": f", vertices: [{', '.join(_row(vertex) for vertex in body.vertices)}]",
+        "mesh": f", vertices: [{', '.join(_list_text(vertex) for vertex in body.vertices)}]",
     }[body.kind]
     return f"{{name: {body.name}, kind: {body.kind}{shape}, {_pose(body.pose)}}}"
 
@@ -222,7 +226,7 @@ def _station(station: Station) -> Iterator[str]:
 
 def _tilt(tilt: ToolTilt) -> str:
     ways = (("axis", tilt.axis), ("direction", tilt.direction))
-    given = "".join(f", {key}: {_row(way)}" for key, way in ways if way)
+    given = "".join(f", {key}: {_list_text(way)}" for key, way in ways if way)
     return f"tilt: {{max: {_number(tilt.most)}{given}}}"
 
 
@@ -285,22 +289,22 @@ def _signals(signals: Sequence[Signal]) -> str:
 def _posture(name: str, posture: FloatArray, robot: RobotModel) -> Iterator[str]:
     degrees = np.round(robot.in_people_units(posture), _DIGITS)
     if np.array_equal(robot.from_people_units(degrees), posture):
-        yield f"{name}_deg: {_row(degrees)}"
+        yield f"{name}_deg: {_list_text(degrees)}"
     else:
-        yield f"{name}: {_row(posture)}"
+        yield f"{name}: {_list_text(posture)}"
 
 
 def _pose(pose: FloatArray) -> str:
     """Return the keys of a pose without braces."""
-    xyz = f"xyz: {_row(pose[:3, 3])}"
+    xyz = f"xyz: {_list_text(pose[:3, 3])}"
     R = pose[:3, :3]
     if np.array_equal(R, np.eye(3)):
         return xyz
     abc = np.round(abc_from_rotation(R), _DIGITS)
     abc[abc == -180.0] = 180.0  # the same turn: a signed zero in R must not change the text
     if np.array_equal(rotation_from_abc(abc), R):
-        return f"{xyz}, abc_deg: {_row(abc)}"
-    return f"{xyz}, rotation: [{', '.join(_row(row) for row in R)}]"
+        return f"{xyz}, abc_deg: {_list_text(abc)}"
+    return f"{xyz}, rotation: [{', '.join(_list_text(row) for row in R)}]"
 
 
 def _block(key: str, entries: Iterable[Iterable[str]]) -> Iterator[str]:
@@ -320,7 +324,7 @@ def _indented(lines: Iterable[str], by: int) -> Iterator[str]:
     return (" " * by + line for line in lines)
 
 
-def _row(values: Iterable[float]) -> str:
+def _list_text(values: Iterable[float]) -> str:
     return f"[{', '.join(_number(value) for value in values)}]"
 
 

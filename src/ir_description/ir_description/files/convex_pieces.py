@@ -300,7 +300,7 @@ def simplify() -> None:
     sys.stdout.buffer.write(stream.getvalue())
 
 
-def _apart(first: FloatArray, second: FloatArray) -> float:
+def _distance_bound(first: FloatArray, second: FloatArray) -> float:
     """A bound [m] of the distance of any point of a surface (T, 3, 3) from another one."""
     points = second.reshape(-1, 3)
     step = _FINE * float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
@@ -372,7 +372,7 @@ def convex_pieces(triangles: FloatArray, most: int, error: float = 0.0) -> Conve
         solid = simplified(whole)
         solid = solid[np.linalg.norm(_normals(solid), axis=1) > 0.0]
         _check_closed(solid)
-        beside += _apart(solid, whole)
+        beside += _distance_bound(solid, whole)
     raw = [_sorted(piece) for piece in _divided(solid, most)]
     for margin in MARGINS:
         if contains([_widened(piece, margin) for piece in raw], whole):

@@ -144,7 +144,7 @@ def _robot(root: Item) -> RobotModel:
     link_names = tuple(name for name, *_ in links)
     capsules = tuple(_capsule(item, link_names) for item in top["capsules"].list(0, 200))
     pairs = [_pair(item) for item in top["self_pairs"].list(0, 1000)]
-    gear_ratio = _row(drives, "gear_ratio", n)
+    gear_ratio = _joint_values(drives, "gear_ratio", n)
     speed, torque = _envelope(drives, n, gear_ratio)
     with root.blamed():
         return RobotModel(
@@ -153,19 +153,19 @@ def _robot(root: Item) -> RobotModel:
             link_names=link_names,
             joint_origin=_origins(joints, n),
             joint_axis=figure(joints["axis"]).rows(3, -1, 1, count=(n, n)),
-            position_min=np.radians(_row(joints, "position_min_deg", n, -3600)),
-            position_max=np.radians(_row(joints, "position_max_deg", n, -3600)),
-            velocity_max=np.radians(_row(joints, "velocity_deg_s", n)),
-            acceleration_max=_row(joints, "acceleration_rad_s2", n),
-            jerk_max=np.radians(_row(joints, "jerk_deg_s3", n)),
+            position_min=np.radians(_joint_values(joints, "position_min_deg", n, -3600)),
+            position_max=np.radians(_joint_values(joints, "position_max_deg", n, -3600)),
+            velocity_max=np.radians(_joint_values(joints, "velocity_deg_s", n)),
+            acceleration_max=_joint_values(joints, "acceleration_rad_s2", n),
+            jerk_max=np.radians(_joint_values(joints, "jerk_deg_s3", n)),
             link_mass=np.array([mass for _, mass, _, _ in links]),
             link_com=np.array([com for _, _, com, _ in links]),
             link_inertia=np.array([inertia for *_, inertia in links]),
             gear_ratio=gear_ratio,
-            reflected_inertia=_row(drives, "reflected_inertia_kgm2", n),
-            friction_viscous=_row(drives, "friction_viscous_nms_rad", n),
-            friction_coulomb=_row(drives, "friction_coulomb_nm", n),
-            copper_loss=_row(drives, "copper_loss_w_per_nm2", n),
+            reflected_inertia=_joint_values(drives, "reflected_inertia_kgm2", n),
+            friction_viscous=_joint_values(drives, "friction_viscous_nms_rad", n),
+            friction_coulomb=_joint_values(drives, "friction_coulomb_nm", n),
+            copper_loss=_joint_values(drives, "copper_loss_w_per_nm2", n),
             envelope_speed=speed,
             envelope_torque=torque,
             counterbalance=_counterbalance(top.get("counterbalance"), joint_names),
@@ -175,7 +175,7 @@ def _robot(root: Item) -> RobotModel:
             load_self_capsules=tuple(
                 item.name() for item in top["load_self_capsules"].list(0, 200)
             ),
-            machine_home=np.radians(_row(top, "machine_home_deg", n, -3600)),
+            machine_home=np.radians(_joint_values(top, "machine_home_deg", n, -3600)),
             rated_payload=figure(top["rated_payload_kg"]).number(0, 1e4, "kg", above=True),
             title=top["title"].text(64) if "title" in top else "",
             motor_turns=_motor_turns(drives, n),
@@ -188,15 +188,15 @@ def _read_joints(top: Table) -> None:
     _origins(joints, n)
     figure(joints["axis"]).rows(3, -1, 1, count=(n, n))
     for key in _JOINT_KEYS[3:]:
-        _row(joints, key, n, -3600)
+        _joint_values(joints, key, n, -3600)
 
 
 def _read_drives(top: Table) -> None:
     drives = top["drives"].table(_DRIVE_KEYS, (_COUPLING,))
     n = len(figure(drives["gear_ratio"]).list(1, 16))
     for key in _DRIVE_KEYS[:-1]:
-        _row(drives, key, n)
-    _envelope(drives, n, _row(drives, "gear_ratio", n))
+        _joint_values(drives, key, n)
+    _envelope(drives, n, _joint_values(drives, "gear_ratio", n))
     _motor_turns(drives, n)
 
 
@@ -221,7 +221,8 @@ def inertia_matrix(entries: Sequence[float] | FloatArray) -> FloatArray:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], dtype=np.float64)
 
 
-def _row(table: Table, key: str, n: int, low: float = 0.0) -> FloatArray:
+def _joint_values(table: Table, key: str, n: int, low: float = 0.0) -> FloatArray:
+    """A figure of every joint (n,)."""
     return figure(table[key]).numbers(n, low, BIG)
 
 
@@ -286,7 +287,8 @@ def _pair(item: Item) -> tuple[tuple[str, str], ReducedDistance | None]:
 
 def _envelope(drives: Table, n: int, gear_ratio: FloatArray) -> tuple[FloatArray, FloatArray]:
     peak = np.minimum(
-        _row(drives, "gear_peak_torque_nm", n), _row(drives, "motor_peak_torque_nm", n) * gear_ratio
+        _joint_values(drives, "gear_peak_torque_nm", n),
+        _joint_values(drives, "motor_peak_torque_nm", n) * gear_ratio,
     )
     joints = figure(drives["envelope_rad_s_nm"]).list(n, n)
     count = len(joints[0].list(1, 50))

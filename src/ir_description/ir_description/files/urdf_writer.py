@@ -132,7 +132,7 @@ def _joint(root: Xml.Element, robot: RobotModel, i: int) -> None:
     _origin(joint, origin[:3, 3], _rpy(origin[:3, :3]))
     Xml.SubElement(joint, "parent", link=robot.link_names[i])
     Xml.SubElement(joint, "child", link=robot.link_names[i + 1])
-    Xml.SubElement(joint, "axis", xyz=_row(robot.joint_axis[i]))
+    Xml.SubElement(joint, "axis", xyz=_numbers_text(robot.joint_axis[i]))
     Xml.SubElement(
         joint,
         "limit",
@@ -169,10 +169,10 @@ def _fixed(
 
 
 def _origin(element: Xml.Element, xyz: Sequence[float] | FloatArray, rpy: Sequence[float]) -> None:
-    Xml.SubElement(element, "origin", xyz=_row(xyz), rpy=_row(rpy))
+    Xml.SubElement(element, "origin", xyz=_numbers_text(xyz), rpy=_numbers_text(rpy))
 
 
-def _row(values: Iterable[float]) -> str:
+def _numbers_text(values: Iterable[float]) -> str:
     return " ".join(repr(float(value) + 0.0) for value in values)
 
 

@@ -334,7 +334,7 @@ class _WorldReader:
             return self._mesh(name, shape, pose)
         size = np.zeros(3)
         if shape.tag == "box":
-            size[:] = _row(_value(shape, "size"), 3)
+            size[:] = _so_many_numbers(_value(shape, "size"), 3)
         else:
             size[0] = number_of(_value(shape, "radius"))
             size[1] = 0.0 if shape.tag == "sphere" else number_of(_value(shape, "length"))
@@ -344,7 +344,7 @@ class _WorldReader:
         """A mesh in metres, as it is or in pieces; one that can't be read is left out."""
         file = _value(shape, "uri" if shape.find("uri") is not None else "filename")
         given = shape.get("scale") or shape.findtext("scale") or "1 1 1"
-        scale = _row(given, 3)
+        scale = _so_many_numbers(given, 3)
         if shape.find("submesh") is not None:
             self.left_out.append(
                 f"{name}: it is a <submesh> of {shown(file)}: write a file of its own"
@@ -442,7 +442,8 @@ def _value(shape: Xml.Element, key: str) -> str:
     return value.strip()
 
 
-def _row(text: str, count: int) -> FloatArray:
+def _so_many_numbers(text: str, count: int) -> FloatArray:
+    """So many finite numbers from a text. Raises ValueError."""
     values = np.array([number_of(word) for word in text.split()])
     if values.shape != (count,) or not np.isfinite(values).all():
         raise ValueError(f"{shown(text)} must be {count} numbers")
@@ -453,8 +454,10 @@ def _urdf_pose(element: Xml.Element) -> FloatArray:
     origin = element.find("origin")
     if origin is None:
         return np.eye(4)
-    angles = np.degrees(_row(origin.get("rpy") or "0 0 0", 3))
-    return pose_of(_row(origin.get("xyz") or "0 0 0", 3), rotation_from_abc(angles[::-1]))
+    angles = np.degrees(_so_many_numbers(origin.get("rpy") or "0 0 0", 3))
+    return pose_of(
+        _so_many_numbers(origin.get("xyz") or "0 0 0", 3), rotation_from_abc(angles[::-1])
+    )
 
 
 Files = dict[str, str]

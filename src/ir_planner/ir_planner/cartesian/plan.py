@@ -220,7 +220,7 @@ def choices_along(
     if not paths:
         paths = [best_along(whole.asked, whole.layers)]
         whole.kept(paths[0])
-    turned = (choice for driven in paths for choice in _turned(driven))
+    turned = (choice for driven in paths for choice in _turned_choices(driven))
     return list(itertools.islice(turned, most))
 
 
@@ -260,7 +260,7 @@ def _different(whole: Drawn) -> list[ConfigurationChain]:
     return chains
 
 
-def _turned(driven: DrivenPath) -> Iterator[ChosenMovement]:
+def _turned_choices(driven: DrivenPath) -> Iterator[ChosenMovement]:
     """A movement as it is, then by whole turns of joints as far as their limits allow."""
     movement = driven.movement
     robot = movement.context.scene.cell.robot
@@ -347,12 +347,12 @@ def plan_path(
     context.journal.planner_id = PLANNER_ID
     context.journal.timing = "synchronous"
     try:
-        return _planned(path, start, t1, context)
+        return _plan_of_path(path, start, t1, context)
     except PathRefusedError as error:
         return _answer(error.status, context)
 
 
-def _planned(
+def _plan_of_path(
     path: CartesianPath, start: FloatArray | None, t1: bool, context: Context
 ) -> CartesianPlan:
     """Draw the path, drive it at least cost, and measure how far the tool may be off it. Raises

@@ -125,7 +125,8 @@ class _Stroke:
         sags = squared * self.motion.between(self.motion.acceleration, times)
         sags += np.diff(u) ** 2 * self.path.bends(u)
         away = _at_most(np.linalg.norm(difference[:, :3, 3], axis=1), sags / 8.0)
-        turns = squared * self.motion.between(self.motion.turning, times) / 8.0 + self._turned(u)
+        driven = squared * self.motion.between(self.motion.turning, times) / 8.0
+        turns = driven + self._rotation_deviations(u)
         norm = _at_most(np.linalg.norm(difference[:, :3, :3], axis=(1, 2)), _ROOT * turns)
         jacobian = self.scene.chain.jacobian(moved.q)
         rows = TURN_LENGTH * jacobian[:, 3:] if self.in_place else jacobian[:, :3]
@@ -134,7 +135,7 @@ class _Stroke:
         turn = 2.0 * portable.arcsin(min(norm / (2.0 * _ROOT), 1.0))
         return PathAccuracy(away, float(turn), self._off(tau, velocity, sags))
 
-    def _turned(self, u: FloatArray) -> FloatArray:
+    def _rotation_deviations(self, u: FloatArray) -> FloatArray:
         """By how much (M - 1,) rotations asked for leave their chords between u (M,) m and the
         next.
         """

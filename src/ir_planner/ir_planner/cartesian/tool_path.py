@@ -68,7 +68,7 @@ def joint_bend(before: PathPart, after: PathPart, radius: float) -> float:
     return bends + 35.0 / (32.0 * radius) * (corner + bends * radius)
 
 
-def _apart(u: FloatArray) -> FloatArray:
+def _distinct_values(u: FloatArray) -> FloatArray:
     """Different values of u (M,) in order; none nearer to the one before than rounding brings
     it.
     """
@@ -105,7 +105,7 @@ class ToolPath:
             for corner, radius in zip(self.corners, self.radius, strict=True)
             if radius > 0.0
         ]
-        return ArcLength(_apart(np.concatenate([*breaks, *zones])), self._speed)
+        return ArcLength(_distinct_values(np.concatenate([*breaks, *zones])), self._speed)
 
     @property
     def length(self) -> float:
@@ -125,7 +125,7 @@ class ToolPath:
             for part, begin in zip(self.parts, self.corners, strict=False)
         ]
         zones = [self.corners - self.radius, self.corners, self.corners + self.radius]
-        u = _apart(np.clip(np.concatenate([*inner, *zones]), 0.0, self.corners[-1]))
+        u = _distinct_values(np.clip(np.concatenate([*inner, *zones]), 0.0, self.corners[-1]))
         return u if self._arc is None else self._arc.of(u)
 
     def bends(self, u: FloatArray) -> FloatArray:
@@ -272,7 +272,7 @@ class ToolPath:
         ends = self._clipped(np.array([-np.inf, np.inf]))
         inner = self.corners + np.linspace(-1.0, 1.0, 33)[:, None] * self.radius
         even = np.linspace(ends[0], ends[1], 40 * len(self.parts) + 200)
-        u = _apart(np.clip(np.concatenate([even, inner.ravel()]), ends[0], ends[1]))
+        u = _distinct_values(np.clip(np.concatenate([even, inner.ravel()]), ends[0], ends[1]))
         tangents = self.tangents(np.minimum(u, ends[1] - 1e-9))
         given = np.tile(np.eye(4), (len(u), 1, 1))
         for k, chosen in self._owners(np.minimum(u, ends[1] - 1e-9)):

@@ -114,7 +114,7 @@ def _length(a: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]))
 
 
-def _turned(rotation: FloatArray, vector: FloatArray) -> FloatArray:
+def _in_world(rotation: FloatArray, vector: FloatArray) -> FloatArray:
     """Vectors (3, K, 1) of links with rotations (3, 3, K, N), (3, K, N) in the world."""
     x, y, z = vector
     return np.asarray(rotation[:, 0] * x + rotation[:, 1] * y + rotation[:, 2] * z)
@@ -141,7 +141,7 @@ def tool_states(
     poses = np.ascontiguousarray(scene.chain.link_poses(q)[:, :, :3].transpose(states))
     rotation = poses[:, :3, 1:]
     places = poses[:, 3, 1:]
-    axis = _turned(rotation, scene.chain.joint_axis.T[:, :, None])
+    axis = _in_world(rotation, scene.chain.joint_axis.T[:, :, None])
     rate = axis * np.ascontiguousarray(qd.T)
     bend = axis * np.ascontiguousarray(qdd.T)
     slide = np.zeros((2, 3, 1, 1))
@@ -162,7 +162,7 @@ def tool_states(
     twist = _length(change) + swing * swing
     centres, radii = scene.tool_points
     size = radii[points, None]
-    arm = _turned(rotation[:, :, -1:], centres[points].T[:, :, None])
+    arm = _in_world(rotation[:, :, -1:], centres[points].T[:, :, None])
     lift = _cross(turn, arm)
     speeds = _length(speed + lift) + size * swing
     bends = _length(gain + _cross(change, arm) + _cross(turn, lift)) + size * twist

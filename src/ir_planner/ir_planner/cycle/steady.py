@@ -417,7 +417,7 @@ class _Model:
         self._times()
         self._half()
         for lag in self.lags:
-            self._apart(lag)
+            self._add_lag(lag)
         for machine, parts in enumerate(self.full):
             self._queue(machine, parts)
             self._at_once(machine, parts)
@@ -586,7 +586,7 @@ class _Model:
             reached |= {seconds: 1.0 for _, _, seconds in self.waits["before", node]}
             self.program.row({**reached, begin: -1.0}, low=0.0, high=0.0)
 
-    def _apart(self, lag: _Lag) -> None:
+    def _add_lag(self, lag: _Lag) -> None:
         """The row of a lag."""
         terms = self._end(lag.start, -1.0)
         terms[self.start[lag.end]] = terms.get(self.start[lag.end], 0.0) + 1.0

@@ -110,7 +110,7 @@ def planned_columns(request: ProgramRequest, route: PartRoute, context: Context)
             steps.append(PlacedStep(ProgramStep("STATION", name), places, places))
             layers.append([nodes[name]])
     over = Route(tuple(steps), scenes, tuple(range(len(steps))))
-    parts = _parts(hops)
+    parts = _keys_of_parts(hops)
     movements = Movements(over, layers, context, settings.searches)
     with context.journal.stage("curves") as notes:
         values = TimeValues(Ladder(movements, improvement), list(parts))
@@ -149,7 +149,7 @@ def _hops(route: PartRoute) -> list[tuple[str, str, PartPlaces]]:
     return loaded + empty
 
 
-def _parts(hops: Sequence[tuple[str, str, PartPlaces]]) -> dict[HopPart, Key]:
+def _keys_of_parts(hops: Sequence[tuple[str, str, PartPlaces]]) -> dict[HopPart, Key]:
     """The movements of all hops; those along service lines once for each station."""
     parts: dict[HopPart, Key] = {}
     seen = set[Key]()

@@ -205,7 +205,7 @@ def with_signals(
     stations = list(standing.stations)
     for name, pose in fronts.items():
         own = cell.station(name)
-        inside = _within(cell.machine(own.equipment).pose, pose)
+        inside = _pose_in(cell.machine(own.equipment).pose, pose)
         stations.append(Station(front_name(name), own.equipment, pose, own.zone, inside))
     signals = {signal.name: signal for signal in standing.signals}
     for machine, own_slots in slots.items():
@@ -223,7 +223,7 @@ def with_signals(
     return replace(standing, stations=tuple(stations), signals=tuple(signals.values()))
 
 
-def _within(frame: FloatArray, pose: FloatArray) -> FloatArray:
+def _pose_in(frame: FloatArray, pose: FloatArray) -> FloatArray:
     """A pose (4, 4) in a frame."""
     turned = frame[:3, :3].T
     inverse = np.eye(4)

@@ -346,7 +346,7 @@ def overlap(before: Move, after: Move, blend: Blend, arm: Arm) -> int:
     for _ in range(_TRIALS):
         if steps <= 0:
             return 0
-        if _within(trajectory([before, after], [steps], names), scene):
+        if _is_within_limits(trajectory([before, after], [steps], names), scene):
             return steps
         steps = steps * 3 // 4
     return 0
@@ -380,7 +380,7 @@ def _near(move: Move, distance: float, arm: Arm, *, ends: bool) -> float:
     return float(share[k - 1] + part * (share[k] - share[k - 1]))
 
 
-def _within(corner: JointTrajectory, scene: PlanningScene) -> bool:
+def _is_within_limits(corner: JointTrajectory, scene: PlanningScene) -> bool:
     """Whether two moves that overlap keep the limits and the torque."""
     limits = scene.limits
     motion = corner.sample(

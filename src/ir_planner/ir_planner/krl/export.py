@@ -219,7 +219,7 @@ class _Job:
         parts = [
             part
             for step, comment, load in zip(self._steps, comments, carried, strict=True)
-            for part in self._parts(step, comment, load)
+            for part in self._statements_of(step, comment, load)
         ]
         from_home = bool(np.abs(self._start - self._scene.cell.machine_home).max() < STILL)
         return self._make.written(
@@ -238,7 +238,9 @@ class _Job:
             numbers=_numbers(self._scene.cell),
         )
 
-    def _parts(self, step: PlannedMovement, comment: str, carried: int) -> list[WrittenStatement]:
+    def _statements_of(
+        self, step: PlannedMovement, comment: str, carried: int
+    ) -> list[WrittenStatement]:
         """The statements of a step, with the base of its machine where points are touched up."""
         waits = WrittenSignals(wait_for=_signals(step.wait_for))
         parts: list[WrittenStatement] = [waits] if step.wait_for else []

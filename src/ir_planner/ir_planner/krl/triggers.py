@@ -84,17 +84,17 @@ def stages_of(moves: Sequence[Move], overlaps: Sequence[int]) -> list[tuple[Moti
     for k, one in enumerate(moves):
         latest = ends[k] if after[k] == 0 else corners[k + 1]
         passed = [float(begins[k] + step) for step in one.passing()]
-        found.append(_parts(passed, free[k], corners[k], begins[k], latest))
+        found.append(_phases(passed, free[k], corners[k], begins[k], latest))
     return found
 
 
 def stages_at(times: FloatArray) -> tuple[MotionPhase, ...]:
     """The stages of a spline that passes its points at these times (parts + 1,) s."""
     first, *passed = times / GRID_S
-    return _parts(passed, first, passed[-1], first, passed[-1])
+    return _phases(passed, first, passed[-1], first, passed[-1])
 
 
-def _parts(
+def _phases(
     passed: Sequence[float], free: float, corner: float, earliest: float, latest: float
 ) -> tuple[MotionPhase, ...]:
     """Stages of parts that end at grid steps (parts,)."""

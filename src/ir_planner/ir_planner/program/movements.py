@@ -202,12 +202,14 @@ class Movements:
         of_one = left // max(len(parts), 1)
         of_line = left // (_PARTS * max(len(self.route), 1))
         most = [of_one if part.kind == ACROSS else min(of_one, of_line) for part in parts]
-        planned = mapped(self._planned, parts, self.context, min(improvement, of_one // 2), most)
+        improving = min(improvement, of_one // 2)
+        planned = mapped(self._movement_of, parts, self.context, improving, most)
         failed = [k for k, answer in enumerate(planned) if isinstance(answer, Failure)]
         for later, k in enumerate(failed, start=1 - len(failed)):
             if most[k] < (left := self.context.work.left):
                 improving = min(improvement, left // (2 - 2 * later))
-                planned[k] = mapped(self._planned, [parts[k]], self.context, improving, [left])[0]
+                again = mapped(self._movement_of, [parts[k]], self.context, improving, [left])
+                planned[k] = again[0]
         return planned
 
     def movement(self, part: HopPart) -> Movement | None:
@@ -276,7 +278,8 @@ class Movements:
         inside = context.inside(self.route.arriving(part.hop))
         return inside.leaning_by(self.route.tilt(part.hop)).upright_from(self.ends(part)[0])
 
-    def _planned(self, part: HopPart, context: Context) -> Movement | Failure:
+    def _movement_of(self, part: HopPart, context: Context) -> Movement | Failure:
+        """The movement of a part, or why there is none."""
         inside = self.asking(part, context)
         return self._across(part, inside) if part.kind == ACROSS else self._along_line(part, inside)
 

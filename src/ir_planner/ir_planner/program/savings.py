@@ -156,7 +156,7 @@ def savings_of(
     moving = (_energy(common) - _energy(standing), _energy(planned) - _energy(own))
     resting = (_energy(standing), _energy(own))
     moved, rested = _spreads(common, planned, pauses, added)
-    saved = interval(_saved(moving), moved), interval(_saved(resting), rested)
+    saved = interval(_difference(moving), moved), interval(_difference(resting), rested)
     return ProgramSavings(
         available=True,
         movements=Saving(*moving, seconds, saved[0].low, saved[0].high),
@@ -189,7 +189,7 @@ def _spreads(
     return moved, rested
 
 
-def _saved(pair: tuple[float, float]) -> float:
+def _difference(pair: tuple[float, float]) -> float:
     return pair[0] - pair[1]
 
 

@@ -104,7 +104,7 @@ class Standby:
             f"{mode} at {at:g} s" for mode, at in zip(self.modes, self.switch_times, strict=True)
         )
         parts = [
-            f"{steps}: saves {self.saving:.0f} J (predicted, 90 % interval {self._within}) "
+            f"{steps}: saves {self.saving:.0f} J (predicted, 90 % interval {self._interval_text}) "
             f"against the controller's own timer (brakes after {self.timer:g} s on motors), "
             f"{self.saving_on_motors:.0f} J against standing on motors"
         ]
@@ -117,7 +117,8 @@ class Standby:
         return "; ".join((*parts, *self.trips, *filter(None, (self.remark,))))
 
     @property
-    def _within(self) -> str:
+    def _interval_text(self) -> str:
+        """The interval of what is saved, and whether zero lies in it."""
         within = f"{self.saving_low:.0f} to {self.saving_high:.0f} J"
         doubtful = self.saving_low <= 0.0 <= self.saving_high and self.saving != 0.0
         return (

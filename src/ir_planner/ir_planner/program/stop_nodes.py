@@ -122,7 +122,9 @@ def withdrawn_lines(
     searched: list[tuple[FloatArray, list[ExitPath]]] = []
     robot = both[0].scene.cell.robot
     for q in interaction:
-        paths_there = next((paths for q_before, paths in searched if _turned(q, q_before)), None)
+        paths_there = next(
+            (paths for q_before, paths in searched if _is_turned_only(q, q_before)), None
+        )
         paths = _exit_paths(q, both, searches) if paths_there is None else paths_there
         if paths_there is None:
             searched.append((q, paths))
@@ -135,7 +137,7 @@ def withdrawn_lines(
     return lines
 
 
-def _turned(a: FloatArray, b: FloatArray) -> bool:
+def _is_turned_only(a: FloatArray, b: FloatArray) -> bool:
     """Whether two configurations differ by whole turns only."""
     return bool(np.abs(portable.sin(0.5 * (a - b))).max() < _SAME)
 

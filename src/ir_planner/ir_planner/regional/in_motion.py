@@ -238,7 +238,7 @@ def braking(end: MovingEnd, context: Context) -> JointTrajectory | None:
     for _ in range(_TRIES):
         trajectory = _stop_lasting(end, seconds, context)
         forwards = trajectory if end.what == "start" else _backwards(trajectory)
-        if _within(trajectory, context) and (
+        if _is_within_limits(trajectory, context) and (
             torque_proof(forwards, context.scene, most * TORQUE_SHARES[0]).violation is None
         ):
             return trajectory
@@ -260,7 +260,8 @@ def _stop_lasting(end: MovingEnd, seconds: float, context: Context) -> JointTraj
     )
 
 
-def _within(trajectory: JointTrajectory, context: Context) -> bool:
+def _is_within_limits(trajectory: JointTrajectory, context: Context) -> bool:
+    """Whether a trajectory keeps the context's limits at every instant, and the joints' range."""
     bounds = context.limits
     robot = context.scene.cell.robot
     largest = extremes(*trajectory.coefficients())

@@ -376,7 +376,7 @@ def spreads(scene: PlanningScene) -> FloatArray:
         if near.link < robot.base:
             continue
         between = set(range(near.link, far.link))
-        turns = _turned(near, far, scene)
+        turns = _moved_by_joints(near, far, scene)
         for joint in between:
             others = between - {joint}
             if others <= set(turns):
@@ -384,7 +384,7 @@ def spreads(scene: PlanningScene) -> FloatArray:
     return spread
 
 
-def _turned(near: Capsule, far: Capsule, scene: PlanningScene) -> dict[int, float]:
+def _moved_by_joints(near: Capsule, far: Capsule, scene: PlanningScene) -> dict[int, float]:
     """How far [m] the ends of two capsules move as the joints next to them turn: nothing on their
     axes.
     """

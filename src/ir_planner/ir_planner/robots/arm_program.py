@@ -214,7 +214,7 @@ def planned_arm(robot: str, request: ProgramRequest, journal: Journal) -> ArmPro
     RequestError for one that doesn't end where it begins, StageError for what isn't found.
     """
     try:
-        return _planned(robot, request, journal)
+        return _arm_program(robot, request, journal)
     except StageError as failed:
         status = failed.status
         sentence = f"the program of {robot}: {status.message}"
@@ -323,7 +323,8 @@ def _lags(cell: Cell, steps: Sequence[PlannedMovement]) -> tuple[Lag, ...]:
     return tuple(lags)
 
 
-def _planned(robot: str, request: ProgramRequest, journal: Journal) -> ArmProgram:
+def _arm_program(robot: str, request: ProgramRequest, journal: Journal) -> ArmProgram:
+    """A robot's own program, each of its movements at several values of a second."""
     route, context = prepared(request, journal)
     choice = chosen(request, route, context, nobody)
     values = TimeValues(choice.ladder, choice.parts)

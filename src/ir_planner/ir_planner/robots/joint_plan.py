@@ -163,13 +163,13 @@ def plan_robots(
             request, work = planner.cycle_request(options, cancelled)
             arms.append(planned_arm(robot, request, Journal(work, request.options.seed)))
         check_lying_parts(arms)
-        arms = _within(arms, peak_power)
+        arms = _sharing_power(arms, peak_power)
         return _Joint(cells.name, tuple(arms), planners, work).plan(cycle_time)
     except StageError as failed:
         return RobotsPlan(failed.status, cells.name, cells.robots)
 
 
-def _within(arms: list[ArmProgram], watts: float) -> list[ArmProgram]:
+def _sharing_power(arms: list[ArmProgram], watts: float) -> list[ArmProgram]:
     """Programs that need at most so many watts together, whenever each of them moves: every robot
     gets a share as large as its part of the sum of all peaks.
     """

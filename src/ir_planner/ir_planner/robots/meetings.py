@@ -61,18 +61,18 @@ class Meetings:
         movement, with what is carried then: what is free of the movement is free of the stop.
         """
         moving = tuple(self._moving(arm, one) for arm, one in zip(arms, pair, strict=True))
-        if self._apart(moving[0], moving[1]):
+        if self._is_free_of(moving[0], moving[1]):
             return
         a, b = at
         yield 2 * a + 1, 2 * b + 1
         standing = tuple(self._standing(arm, k) for arm, k in zip(arms, at, strict=True))
-        first = self._apart(standing[0], moving[1])
-        second = self._apart(moving[0], standing[1])
+        first = self._is_free_of(standing[0], moving[1])
+        second = self._is_free_of(moving[0], standing[1])
         if not first:
             yield 2 * a, 2 * b + 1
         if not second:
             yield 2 * a + 1, 2 * b
-        if not (first or second or self._apart(standing[0], standing[1])):
+        if not (first or second or self._is_free_of(standing[0], standing[1])):
             yield 2 * a, 2 * b
 
     def _moving(self, arm: ArmProgram, movement: Movement) -> SweptArm:
@@ -87,7 +87,8 @@ class Meetings:
             self._swept[key] = arm.stops[k], arm.standing(k)
         return self._swept[key][1]
 
-    def _apart(self, one: SweptArm, other: SweptArm) -> bool:
+    def _is_free_of(self, one: SweptArm, other: SweptArm) -> bool:
+        """Whether two arms keep the margin wherever each of them is in what it sweeps."""
         key = id(one), id(other)
         if key not in self._free:
             closest = meeting(one, other, self.margin - PROOF_TOLERANCE)

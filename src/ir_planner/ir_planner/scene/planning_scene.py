@@ -66,16 +66,16 @@ class Drives:
         """
         parameters = self.parameters
         if parameters is None:
-            return self._within(robot)
+            return self._with_torque_left(robot)
         if (parameters.robot, parameters.joints) != (robot.name, robot.joint_names):
             raise RequestError(
                 StatusCode.INVALID_GOAL_CONSTRAINTS,
                 f"power parameters {parameters.name!r} are of robot {parameters.robot!r}: "
                 f"the cell has {robot.name!r}",
             )
-        return self._within(parameters.robot_with(robot))
+        return self._with_torque_left(parameters.robot_with(robot))
 
-    def _within(self, robot: RobotModel) -> RobotModel:
+    def _with_torque_left(self, robot: RobotModel) -> RobotModel:
         """The robot with the torque that current and voltage leave, where these bound it."""
         return robot if self.voltage is None else within_current_and_voltage(robot, self.voltage)
 

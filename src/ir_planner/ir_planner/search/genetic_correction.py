@@ -129,7 +129,7 @@ def _round_stretch(
     return replace(best, generations=generations), stretch
 
 
-def _parts(path: FloatArray) -> IntArray:
+def _sample_counts(path: FloatArray) -> IntArray:
     """Into how many parts each step (M-1,) of a path (M, n) is sampled."""
     lengths = np.abs(np.diff(path, axis=0)).max(axis=1)
     parts: IntArray = np.maximum(np.ceil(lengths / _SPACING).astype(np.int64), 1)
@@ -138,7 +138,7 @@ def _parts(path: FloatArray) -> IntArray:
 
 def _price(path: FloatArray) -> int:
     """Work that looking for the colliding stretch of a path (M, n) takes."""
-    return batch_work(int(_parts(path).sum()) + 1)
+    return batch_work(int(_sample_counts(path).sum()) + 1)
 
 
 def colliding_stretch(
@@ -150,7 +150,7 @@ def colliding_stretch(
     the M-1 steps, not all of them free. The stretch is widened at both ends by `margin` times its
     own length.
     """
-    counts = _parts(path)
+    counts = _sample_counts(path)
     first = np.concatenate([[0], np.cumsum(counts)])  # index of each waypoint among the samples
     step = np.repeat(np.arange(len(counts)), counts)
     share = (np.arange(len(step)) - first[step]) / counts[step]

@@ -216,7 +216,7 @@ def fastest_levels(
         trial = 0.5 * (low + high)
     for _ in range(6):
         laws = level_laws(speeds, low[:, :LEVELS], low[:, LEVELS:], jerk)
-        good = _within(laws, bounds) & (
+        good = _which_keep(laws, bounds) & (
             _use(laws, start, delta, dynamics).max(axis=(1, 2)) <= share
         )
         if good.any():
@@ -228,7 +228,7 @@ def fastest_levels(
     return None
 
 
-def _within(laws: LevelLaws, bounds: tuple[float, float, float]) -> BoolArray:
+def _which_keep(laws: LevelLaws, bounds: tuple[float, float, float]) -> BoolArray:
     """Which laws keep the bounds of speed, acceleration and jerk."""
     tops = (laws.speeds, laws.accelerations, laws.jerks)
     kept = [np.abs(x).max(axis=1) <= b * (1 + 1e-9) for x, b in zip(tops, bounds, strict=True)]

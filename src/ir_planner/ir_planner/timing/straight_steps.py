@@ -50,13 +50,13 @@ def own_laws(
     torque allows.
     """
     own = _fastest_asynchronous(delta, limits)
-    if _within(start, delta, own, limits, dynamics):
+    if _is_within_torque(start, delta, own, limits, dynamics):
         return own, frozenset()
     moving = np.flatnonzero(np.abs(delta) >= STILL)
     joined = frozenset(int(j) for j in moving)
     for joint in sorted(moving, key=lambda j: -own.laws[j].total):
         fewer = joined - {int(joint)}
-        if _within(start, delta, _mixed(own, common, fewer), limits, dynamics):
+        if _is_within_torque(start, delta, _mixed(own, common, fewer), limits, dynamics):
             joined = fewer
     return _mixed(own, common, joined), joined
 
@@ -93,7 +93,7 @@ def _fastest_asynchronous(delta: FloatArray, limits: MotionLimits) -> StepLaws:
     return StepLaws(tuple(TimeLaw(tuple(int(k) for k in row)) for row in phase_steps(bounds)))
 
 
-def _within(
+def _is_within_torque(
     start: FloatArray, delta: FloatArray, laws: StepLaws, limits: MotionLimits, dynamics: Dynamics
 ) -> bool:
     """Whether torque stays within its share at samples of the laws."""

@@ -62,7 +62,7 @@ def plan_through(
     Given times keep their proportions and are stretched where limits ask for it. Raises
     RequestError.
     """
-    reference = _within(reference, scene)
+    reference = _checked_reference(reference, scene)
     context = Context.of(scene, options, work)
     if options.planner_id:
         sentence = (
@@ -107,7 +107,7 @@ def _with_what_torque_there_is(reference: Reference, context: Context) -> Moveme
     raise reason
 
 
-def _within(reference: Reference, scene: PlanningScene) -> Reference:
+def _checked_reference(reference: Reference, scene: PlanningScene) -> Reference:
     """The reference with its points within the limits; RequestError for what can't be driven."""
     count = len(reference.points)
     if not 1 <= count <= POINTS_MAX:

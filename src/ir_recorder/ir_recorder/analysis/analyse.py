@@ -82,8 +82,8 @@ def program_totals(
         Share("program", end - start, meter.energy(start, end) if meter else NAN),
         _measured("movements", moved),
         _measured("pauses", rested),
-        _planned("movements", moved),
-        _planned("pauses", rested),
+        _planned_sums("movements", moved),
+        _planned_sums("pauses", rested),
         unshortened,
     )
 
@@ -176,7 +176,8 @@ def _measured(name: str, results: Sequence[StepResult]) -> Share:
     return Share(name, sum(r.seconds for r in results), sum(r.energy for r in results))
 
 
-def _planned(name: str, results: Sequence[StepResult]) -> Share:
+def _planned_sums(name: str, results: Sequence[StepResult]) -> Share:
+    """Time and joules that were planned for these steps."""
     plans = [r.step.movement for r in results]
     return Share(
         name,

@@ -187,7 +187,7 @@ def _cycle_of(analysis: Analysis) -> Production | None:
         return _driven(analysis, analysis.program)
     planned = analysis.recording.planned
     if planned_share(planned) is not None:
-        return _planned(analysis, planned)
+        return _predicted_production(analysis, planned)
     savings = analysis.savings
     if savings is None or savings.total.seconds <= 0.0:
         return None
@@ -600,7 +600,10 @@ def planned_clearance(steps: Sequence[PlannedMovement]) -> float:
     return min((step.report.min_clearance for step in steps if not step.is_pause), default=math.nan)
 
 
-def _planned(analysis: Analysis, planned: Sequence[PlannedMovement]) -> Production | None:
+def _predicted_production(
+    analysis: Analysis, planned: Sequence[PlannedMovement]
+) -> Production | None:
+    """The year of a program that was planned, None where it has no joules."""
     whole = planned_share(planned)
     if whole is None or whole.seconds <= 0.0 or not math.isfinite(whole.energy):
         return None

@@ -127,7 +127,7 @@ def tending_of(
     first = 0
     for number, place in enumerate(ends, 1):
         own = steps[first : place + 1]
-        rows.append(_row(number, own, machines, starts, answers))
+        rows.append(_part_row(number, own, machines, starts, answers))
         first = place + 1
     return Tending(tuple(rows), _filling(rows, machines), machines, tuple(steps))
 
@@ -136,13 +136,14 @@ def _at(step: TendedStep) -> str:
     return step.movement.to_station
 
 
-def _row(
+def _part_row(
     number: int,
     steps: Sequence[TendedStep],
     machines: Sequence[MachineTimes],
     starts: dict[str, str],
     answers: dict[str, str],
 ) -> PartRow:
+    """What one part took, and who waited for whom."""
     span = Span(steps[0].begin, steps[-1].end)
     paused: dict[str, float] = {}
     late: dict[str, float] = {}

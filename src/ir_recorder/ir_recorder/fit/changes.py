@@ -470,10 +470,10 @@ def _candidates(kind: str, usual: Opened) -> Iterator[Change]:
                 yield at(float(time[0]), fading=fading)
         if kind == WATTS:
             for first, behind in rests(run.samples):
-                yield from _within(at, time[first], time[behind - 1])
+                yield from _stretches_of_rest(at, time[first], time[behind - 1])
 
 
-def _within(at: Callable[..., Change], first: float, last: float) -> Iterator[Change]:
+def _stretches_of_rest(at: Callable[..., Change], first: float, last: float) -> Iterator[Change]:
     """Stretches of a rest."""
     if last - first < _SHORTEST_REST:
         return

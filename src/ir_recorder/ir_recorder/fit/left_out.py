@@ -40,7 +40,7 @@ class LeftOut:
 
 def left_out(estimate: Estimate) -> tuple[LeftOut, ...]:
     """Every part by every method, after a fit (`Estimate.result`)."""
-    parts = _parts(estimate)
+    parts = _parts_to_leave_out(estimate)
     if estimate.meter is not None:
         return _metered(estimate, parts)
     return _worked(estimate, parts)
@@ -87,7 +87,8 @@ class _Part:
     windows: IntArray
 
 
-def _parts(estimate: Estimate) -> list[_Part]:
+def _parts_to_leave_out(estimate: Estimate) -> list[_Part]:
+    """Each run, where every run moves axes of its own; else quarters of all runs."""
     known = np.unique(estimate.window)
     own = [known[(known >= run.first) & (known < _end(run))] for run in estimate.runs]
     if _all_move_elsewhere(estimate.runs):

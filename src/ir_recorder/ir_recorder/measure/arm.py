@@ -116,7 +116,7 @@ def _next(
         place = before.place + arm + q[:, None] * world
         push = before.push + qdd[:, None] * world
         return _Frame(still, place, before.spin, before.spin_rate, push), world
-    turn = still @ _turned(axis, q)
+    turn = still @ _rotations_about(axis, q)
     world = turn @ axis
     spin = before.spin + qd[:, None] * world
     rate = before.spin_rate + qdd[:, None] * world + np.cross(before.spin, qd[:, None] * world)
@@ -124,7 +124,7 @@ def _next(
     return _Frame(turn, before.place + arm, spin, rate, push), world
 
 
-def _turned(axis: FloatArray, angle: FloatArray) -> FloatArray:
+def _rotations_about(axis: FloatArray, angle: FloatArray) -> FloatArray:
     """Turns (N, 3, 3) by angles (N,) about an axis (3,)."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

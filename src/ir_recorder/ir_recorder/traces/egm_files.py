@@ -144,7 +144,7 @@ def _rows(content: bytes, path: Path) -> tuple[list[_Row], str, int, int]:
         end = 0
         try:
             for message, after in way(content):
-                row = _row(_fields(message))
+                row = _row_of_message(_fields(message))
                 end = after
                 others += row is None
                 rows += [row] if row is not None else []
@@ -201,7 +201,7 @@ def _bare(content: bytes) -> Iterator[tuple[bytes, int]]:
     yield content[begin:at], at
 
 
-def _row(message: Fields) -> _Row | None:
+def _row_of_message(message: Fields) -> _Row | None:
     """What a message of the robot says, None of another one. Raises _NoMessageError."""
     header = _inside(message, _HEADER)
     feedback = _inside(message, _FEEDBACK)

@@ -157,7 +157,7 @@ def _mean(trajectory: JointTrajectory, window: float, moving: bool) -> JointTraj
     steps = np.diff(at)[:, None] * 0.5 * (velocities[1:] + velocities[:-1])
     mean = 0.5 * (start + q[0]) + np.vstack((np.zeros(q.shape[1]), np.cumsum(steps, axis=0)))
     mean[-1] = q[-1]
-    kept = _apart(knots)
+    kept = _kept_knots(knots)
     return JointTrajectory(trajectory.joint_names, knots[kept], mean[kept], velocities[kept])
 
 
@@ -170,7 +170,7 @@ def _passed(trajectory: JointTrajectory, executed: JointTrajectory, window: floa
     return float(np.abs(executed.sample(at).q - trajectory.positions[between]).max())
 
 
-def _apart(knots: IntArray) -> IntArray:
+def _kept_knots(knots: IntArray) -> IntArray:
     """Indices of knots (N,) [ns], ascending, that are at least _APART apart; the first and the last
     stay.
     """

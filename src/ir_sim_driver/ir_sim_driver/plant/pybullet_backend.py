@@ -76,7 +76,7 @@ def urdf_of(robot: RobotModel, bodies: Sequence[PhysicsBody]) -> str:
         origin = _origin(body.pose[:3, 3], _rpy(body.pose[:3, :3]))
         parts.append(
             f'<joint name="{i + 1}" type="{kind}">{origin}'
-            f'<parent link="{i}"/><child link="{i + 1}"/><axis xyz="{_row(body.axis)}"/>'
+            f'<parent link="{i}"/><child link="{i + 1}"/><axis xyz="{_numbers_text(body.axis)}"/>'
             f'<limit lower="{low[i]!r}" upper="{high[i]!r}" velocity="0" effort="0"/></joint>'
         )
     return f'<robot name="plant">{"".join(parts)}</robot>'
@@ -138,10 +138,10 @@ def _link(i: int, mass: float, com: FloatArray, moments: FloatArray) -> str:
 
 
 def _origin(xyz: FloatArray, rpy: FloatArray) -> str:
-    return f'<origin xyz="{_row(xyz)}" rpy="{_row(rpy)}"/>'
+    return f'<origin xyz="{_numbers_text(xyz)}" rpy="{_numbers_text(rpy)}"/>'
 
 
-def _row(values: FloatArray) -> str:
+def _numbers_text(values: FloatArray) -> str:
     return " ".join(repr(x) for x in values.tolist())
 
 

@@ -412,12 +412,12 @@ class ModbusServer:
         else:
             self._take_leave(writer)
         try:
-            while request := await self._within(_next_request(reader)):
+            while request := await self._unless_idle(_next_request(reader)):
                 writer.write(self._answer(*request))
                 if writer in self._leaving:
                     break
                 self._heard[writer] = self._loop.time()
-                await self._within(writer.drain())
+                await self._unless_idle(writer.drain())
                 # others' turn: requests that are here already need no waiting
                 await asyncio.sleep(0)
         except _DROPPED:
@@ -437,7 +437,8 @@ class ModbusServer:
             eldest.transport.abort()
         self._leaving[writer] = self._loop.call_later(_HELD, writer.transport.abort)
 
-    async def _within(self, work: Awaitable[T]) -> T:
+    async def _unless_idle(self, work: Awaitable[T]) -> T:
+        """What work gives. TimeoutError where it takes longer than a connection may be idle."""
         async with asyncio.timeout(self._limits.idle):
             return await work
 

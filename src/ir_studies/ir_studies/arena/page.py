@@ -514,7 +514,7 @@ def _cell_section(
     for head, part in ((_BLOCKED, blocked), (_FREE, free)):
         if part:
             rows = [
-                _row(figures(planner, part), against(winner, planner, part).cost, winner)
+                _planner_cells(figures(planner, part), against(winner, planner, part).cost, winner)
                 for planner in planners
             ]
             parts.append(f"<h3>{head}</h3>{table(heads, rows, f'{title}: {head.lower()}')}")
@@ -523,7 +523,8 @@ def _cell_section(
     return f'<details class="part">{head}{shown}</details>'
 
 
-def _row(found: Figures, cost: Mean, winner: str) -> tuple[str, ...]:
+def _planner_cells(found: Figures, cost: Mean, winner: str) -> tuple[str, ...]:
+    """A planner's row of the table."""
     return (
         text(found.planner),
         f"<b>{found.solved}</b> of {found.count}",

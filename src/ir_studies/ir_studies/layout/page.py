@@ -873,7 +873,11 @@ def write_outputs(
 
     Raises RecorderError for files that can't be written, or replaced.
     """
-    rows = [_row(k, one, c, settings) for k, one in enumerate(known) for c in settings.conditions]
+    rows = [
+        _placement_values(k, one, c, settings)
+        for k, one in enumerate(known)
+        for c in settings.conditions
+    ]
     columns = {name: [row[name] for row in rows] for name in rows[0]}
     written = [write_columns(columns, folder / "table.csv", _TABLE_START, ANYWHERE)]
     others = [own for own in finals if not own[0].is_given]
@@ -902,7 +906,7 @@ def _named(path: Path, name: str) -> bool:
     return content.startswith(_CELL_START) and f"name: {name}".encode() in content.splitlines()
 
 
-def _row(
+def _placement_values(
     k: int, known: Known, condition: PlacementCondition, settings: LayoutSettings
 ) -> dict[str, Value]:
     plan = known.plans.get(condition, {})

@@ -525,7 +525,7 @@ def _table(comparisons: Sequence[Comparison], caption: str, sides: tuple[str, st
     """sides: of what the means are. With a column of movements where these are more than the
     pairs.
     """
-    rows = [_row(each) for each in comparisons]
+    rows = [_comparison_cells(each) for each in comparisons]
     heads = [*_HEADS[:2], *sides, *_HEADS[2:]]
     if any(each.count != each.pairs for each in comparisons):
         heads.insert(1, ">movements")
@@ -535,7 +535,8 @@ def _table(comparisons: Sequence[Comparison], caption: str, sides: tuple[str, st
     return table(heads, rows, caption)
 
 
-def _row(each: Comparison) -> tuple[str, ...]:
+def _comparison_cells(each: Comparison) -> tuple[str, ...]:
+    """A comparison's row of the table."""
     equal = each.count - each.less - each.more
     return (
         text(each.name),

@@ -202,7 +202,7 @@ class Cluster:
                 if future is None:
                     continue
                 turn = self._running.pop(future)
-                row = self._row(future, turn)
+                row = self._row_given(future, turn)
                 if row is None:
                     self._submit(turn, done)
                 else:
@@ -247,7 +247,7 @@ class Cluster:
         except Empty:
             return None
 
-    def _row(self, future: Any, turn: _Turn) -> Row | None:
+    def _row_given(self, future: Any, turn: _Turn) -> Row | None:
         """What a job gave; None where it is to be made again, since its workers died: it need not
         be why.
         """
@@ -281,7 +281,9 @@ class Cluster:
         trace: TracebackType | None,
     ) -> None:
         if self._client.status == "running":
-            _within(_LEAVE_S, lambda: self._client.run(end_study, self._study, on_error="ignore"))
+            _act_at_most(
+                _LEAVE_S, lambda: self._client.run(end_study, self._study, on_error="ignore")
+            )
         with suppress(OSError):
             self._client.close(timeout=_LEAVE_S)
 
@@ -290,10 +292,10 @@ class Cluster:
         left = list(self._running)
         self._running.clear()
         if left and self._client.status == "running":
-            _within(_LEAVE_S, lambda: self._client.cancel(left))
+            _act_at_most(_LEAVE_S, lambda: self._client.cancel(left))
 
 
-def _within(seconds: float, act: Callable[[], object]) -> None:
+def _act_at_most(seconds: float, act: Callable[[], object]) -> None:
     """Wait for an act so long at most: what has stopped at the other end must not hold who
     leaves.
     """

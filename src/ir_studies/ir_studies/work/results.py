@@ -114,7 +114,7 @@ class Results:
             raise StudyError(
                 f"{self.path} holds no results of {_TITLES[self._kind]}: name another folder"
             )
-        rows = [self._row(number, line) for number, line in enumerate(lines[1:], start=2)]
+        rows = [self._row_of_line(number, line) for number, line in enumerate(lines[1:], start=2)]
         self.rows = {row["key"]: row for row in rows if "key" in row}
         known = dict(pair for row in rows for pair in row.get("cells", {}).items())
         self._made = [str(row["made_with"]) for row in rows if "made_with" in row]
@@ -127,7 +127,7 @@ class Results:
         if new:
             self._write({"cells": new})
 
-    def _row(self, number: int, line: bytes) -> Row:
+    def _row_of_line(self, number: int, line: bytes) -> Row:
         """A line that this class has written."""
         row = _mapping(line)
         if (

@@ -81,7 +81,7 @@ def _mapping(content: str) -> dict[Any, Any] | None:
 def checked_number(key: str, value: Any, low: float, high: float, *, whole: bool = False) -> None:
     """SettingsError where a value is no number of the range."""
     kinds = int if whole else int | float
-    if isinstance(value, bool) or not isinstance(value, kinds) or not _within(value, low, high):
+    if isinstance(value, bool) or not isinstance(value, kinds) or not _is_within(value, low, high):
         number = "a whole number" if whole else "a number"
         raise SettingsError(f"{key} is {value!r:.60}: it must be {number} in {low:g} .. {high:g}")
 
@@ -100,7 +100,8 @@ def checked_known(key: str, names: Iterable[object], known: Collection[str]) -> 
             raise SettingsError(unknown_name(f"{key}:", name, dict.fromkeys(known)))
 
 
-def _within(value: float, low: float, high: float) -> bool:
+def _is_within(value: float, low: float, high: float) -> bool:
+    """Whether a number is finite and in [low, high]; an integer may be too large for a float."""
     return (
         low <= value <= high
         if isinstance(value, int)

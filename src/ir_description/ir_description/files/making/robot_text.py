@@ -111,7 +111,9 @@ def drive_sheet(text: str, source: str, arm: UrdfArm) -> DriveSheet:
     top = read_items(text, source, RobotFileError).table(_KEYS, _OPTIONAL)
     top["format"].choice((SHEET_FORMAT,))
     known = {
-        key: value for key, (unit, low) in _ROWS.items() if (value := _row(top, key, unit, low))
+        key: value
+        for key, (unit, low) in _ROWS.items()
+        if (value := _given_values(top, key, unit, low))
     }
     known["rated_payload_kg"] = _value(
         top["rated_payload_kg"], lambda item: item.number(0, 1e4, "kg", above=True)
@@ -161,7 +163,8 @@ def _unknown(item: Item) -> bool:
     return item.is_scalar() and item.text() == UNKNOWN
 
 
-def _row(top: Table, key: str, unit: str, low: float) -> Value | None:
+def _given_values(top: Table, key: str, unit: str, low: float) -> Value | None:
+    """A figure of every axis, None where it is not given or unknown."""
     if key not in top or _unknown(top[key]):
         return None
     return _value(top[key], lambda item: item.numbers(AXES, low, 1e12, unit))

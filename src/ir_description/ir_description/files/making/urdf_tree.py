@@ -351,12 +351,12 @@ class _Reader:
         size = np.zeros(3)
         file = ""
         if one.tag == "mesh":
-            size[:] = _row(one, "scale", what, "1 1 1")
+            size[:] = _three_numbers(one, "scale", what, "1 1 1")
             file = one.get("filename", "")
             if not file or not size.all():
                 raise _UrdfError(one, f"{what} is a mesh without a filename, or of scale 0")
         elif one.tag == "box":
-            size[:] = _row(one, "size", what)
+            size[:] = _three_numbers(one, "size", what)
         else:
             lengths = [_number(one, key, what) for key in _SIZES[one.tag]]
             size[: len(lengths)] = lengths
@@ -463,7 +463,7 @@ def _name(element: Xml.Element, what: str) -> str:
 def _axis(element: Xml.Element, name: str) -> FloatArray:
     axis = element.find("axis")
     direction = (
-        _row(axis, "xyz", f"the axis of joint {name}", "1 0 0")
+        _three_numbers(axis, "xyz", f"the axis of joint {name}", "1 0 0")
         if axis is not None
         else np.array([1.0, 0.0, 0.0])
     )
@@ -482,9 +482,9 @@ def _origin(element: Xml.Element, what: str) -> FloatArray:
             raise _UrdfError(
                 origin, f"{what} has an orientation as quat_xyzw: write it as rpy (URDF 1.0)"
             )
-        roll, pitch, yaw = np.degrees(_row(origin, "rpy", what, "0 0 0"))
+        roll, pitch, yaw = np.degrees(_three_numbers(origin, "rpy", what, "0 0 0"))
         pose[:3, :3] = rotation_from_abc((yaw, pitch, roll))
-        pose[:3, 3] = _row(origin, "xyz", what, "0 0 0")
+        pose[:3, 3] = _three_numbers(origin, "xyz", what, "0 0 0")
         if np.abs(pose[:3, 3]).max() > LENGTH_MAX:
             raise _UrdfError(
                 origin, f"{what} is {np.abs(pose[:3, 3]).max():g} m away: is its unit another?"
@@ -505,7 +505,10 @@ def _number(element: Xml.Element, key: str, what: str, missing: str | None = Non
     return value
 
 
-def _row(element: Xml.Element, key: str, what: str, missing: str | None = None) -> FloatArray:
+def _three_numbers(
+    element: Xml.Element, key: str, what: str, missing: str | None = None
+) -> FloatArray:
+    """The numbers (3,) of an attribute; missing: its text where it is not there."""
     text = element.get(key, missing)
     if text is None:
         raise _UrdfError(element, f"{what} has no {key}")
