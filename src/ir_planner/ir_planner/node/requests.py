@@ -1,5 +1,8 @@
 """One method per service: the request's values go to the planner, its answer into the response.
 
+A method has the name of the planner's method that it asks: `plan_regional` answers the service
+`plan_regional_movement`, `plan_service` and `plan_cartesian` likewise.
+
 Whatever makes no sense is answered by its status: the node lives on and its state is unchanged.
 """
 
