@@ -229,7 +229,7 @@ class PlanWorker:
         start = cell.posture(cell.cycle_start(asked.stations))
         found = before_after_common(planner, asked.stations, start, 0.0, options, progress)
         costs = Costs()
-        figures = figure_table(found, costs) + change_table(found, cell, costs)
+        figures = figure_table(found, cell, costs) + change_table(found, cell, costs)
         return Planned(None, compared=figures + assumptions(costs) + basis_section(found, cell))
 
     def _stop_if_old(self, asked: ViewRequest) -> None:
