@@ -117,6 +117,20 @@ def test_the_largest_quarter_of_an_hour_is_compared(
     assert "at night and at weekends" in row
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_changes_add_up_to_what_is_saved_together(
+    compared: BeforeAfter, planner: Planner, seed: int
+) -> None:
+    price = float(np.random.default_rng(seed).uniform(0.05, 2.0))
+    page = plain(before_after_html(compared, planner.cell, Costs(price=price)))
+    table = page.split(">Changes</caption>")[1].partition("</table>")[0]
+    rows = re.findall(r"<tr>(.*?)</tr>", table.partition("<tbody>")[2], re.DOTALL)
+    years = [re.findall(r"(-?[\d.\s]*\d) EUR(?:</b>|</td>)", row)[0] for row in rows]
+    *parts, whole = (float(re.sub(r"\s", "", year)) for year in years)
+    assert len(parts) > 2
+    assert sum(parts) == pytest.approx(whole, abs=1e-9)
+
+
 def test_an_interval_with_zero_in_it_says_so(compared: BeforeAfter, planner: Planner) -> None:
     doubtful = tuple(
         replace(side, moving=replace(side.moving, saved_low=-1e6)) for side in compared.sides

@@ -43,7 +43,7 @@ from ir_recorder.report.costs import (
     recorded_idle_saving,
 )
 from ir_recorder.report.fleet import fleet_html, fleet_of_line, member_of
-from ir_recorder.report.money_text import money, yearly_money, yearly_span
+from ir_recorder.report.money_text import adding_up, money, yearly_money, yearly_span
 from ir_recorder.report.number_text import kilograms, kilowatt_hours, watts
 from ir_recorder.report.paid import with_span
 from ir_values.settings import settings_table
@@ -398,7 +398,9 @@ def test_a_fleet_counts_the_same_robots_in_shifts_and_at_night(
     assert f"<b>{yearly_money(shifts + nights, 'EUR')}</b>" in picture
     assert "second alike in all: no file says what its plan saves" in picture
     driven = picture.partition(">today, nights")[2]
-    assert f"{yearly_money(nights, 'EUR')} outside" in driven  # nobody recorded a night
+    today = sum(costs.energy_of_year(each.cycle).value for each in (member, bare))
+    _, outside = adding_up((costs.money(today), nights), "EUR")
+    assert f"{outside} outside" in driven  # nobody recorded a night
     assert "of the saving is at night, from the data sheet" in page
     assert "Simulated, not measured" in page
     assert 'The plan of "first" instead of its common program' in unescape(page)

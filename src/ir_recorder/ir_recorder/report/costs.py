@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeGuard
@@ -33,6 +33,7 @@ from ir_recorder.report.money_text import (
     NOTHING,
     UNSEEN,
     Repriced,
+    adding_up,
     hours_of,
     money,
     months_of,
@@ -513,6 +514,12 @@ def money_of_thousand(energy: float, costs: Costs) -> str:
     return f"{money(1000.0 * costs.money(energy), costs.currency)} for 1 000"
 
 
+def moneys_of_thousand(energies: Sequence[float], costs: Costs) -> list[str]:
+    """The same of robots that make a part together, as it adds up."""
+    prices = [1000.0 * costs.money(energy) for energy in energies]
+    return [f"{each} for 1 000" for each in adding_up(prices, costs.currency, yearly=False)]
+
+
 def payback(money: Amount, costs: Costs) -> str:
     """How many hours of an engineer a saving of a year pays for, and after how long one is paid;
     "" where it is open whether anything is saved, or next to nothing is.
@@ -542,18 +549,45 @@ def _saved(cycle: Production, costs: Costs) -> list[tuple[str, ...]]:
     parts = [("by its movements", savings.movements)]
     if savings.pauses.seconds > 0.0:
         parts += [("in its pauses", savings.pauses), ("together", savings.total)]
-    return [_saving(name, saving, cycle.pace, costs) for name, saving in parts]
+    shown = _parts_of_saving([saving for _, saving in parts[:2]], cycle.pace, costs)
+    return [
+        _saving(name, saving, cycle.pace, costs, own)
+        for (name, saving), own in zip(parts, [*shown, ()], strict=False)
+    ]
 
 
-def _saving(where: str, saving: Saving, pace: float, costs: Costs) -> tuple[str, ...]:
+def _parts_of_saving(savings: Sequence[Saving], pace: float, costs: Costs) -> list[tuple[str, ...]]:
+    """Money of movements and of pauses of a thousand parts, a shift and a year, as it adds up;
+    empty where there is no sum, or one of them takes more and the other less.
+    """
+    gains = [saved_amount(saving).gain() for saving in savings]
+    if len({word for word, _ in gains}) > 1 or len(gains) == 1:
+        return [() for _ in savings]
+    columns = [
+        adding_up(
+            [costs.money(amount.value * count) for _, amount in gains],
+            costs.currency,
+            yearly=False,
+        )
+        for count in _counts(pace, costs)
+    ]
+    return [tuple(column[k] for column in columns) for k in range(len(savings))]
+
+
+def _saving(
+    where: str, saving: Saving, pace: float, costs: Costs, own: Sequence[str]
+) -> tuple[str, ...]:
+    """own: its amounts as parts of a sum, empty where there is none."""
     word, amount = saved_amount(saving).gain()
     doubt = f"<small>{amount.doubt}</small>" if amount.doubt else ""
     cells = [f"<b>{kilowatt_hours(amount.value)}</b>{small_span(amount, kilowatt_hours)}{doubt}"]
     counts = _counts(pace, costs)
     year = costs.money(amount.value * counts[-1])
-    for count in counts:
+    for k, count in enumerate(counts):
         price = amount.times(count).of(costs.money)
         shown = _shown(price.value, year, costs.currency)
+        if own and shown != NEXT_TO_NOTHING:
+            shown = own[k]
         between = ""
         if abs(year) >= NOTHING and price.high > price.low:
             between = (
@@ -587,7 +621,7 @@ def counted_with(costs: Costs) -> str:
     )
     return (
         f'{text(words)}<a class="screen" href="#assumed">: all values, and how to give yours</a>. '
-        f"{_stands(costs)}Each amount is rounded by itself."
+        f"{_stands(costs)}".rstrip()
     )
 
 

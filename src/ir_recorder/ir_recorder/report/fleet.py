@@ -56,7 +56,15 @@ from ir_recorder.report.costs import (
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import started
 from ir_recorder.report.methods import counted
-from ir_recorder.report.money_text import NOTHING, money_of, yearly_money, yearly_span
+from ir_recorder.report.money_text import (
+    NOTHING,
+    adding_up,
+    groups_adding_up,
+    larger_end,
+    money_of,
+    yearly_money,
+    yearly_span,
+)
 from ir_recorder.report.number_text import (
     DASH,
     ENGLISH,
@@ -777,14 +785,18 @@ _ROBOT_HEADS = (
 
 def _robots(members: Sequence[Member], robots: Sequence[Robot], costs: Costs) -> str:
     """Those that cost most, each with what to change first; the others in one row."""
-    rows = [_robot_row(robot, members, costs) for robot in robots[:_MOST_ROBOTS]]
     rest = robots[_MOST_ROBOTS:]
     others = [robot for robot in rest if not robot.drives_only]
+    first = [[robot] for robot in robots[:_MOST_ROBOTS]]
+    shown = _adding_up([*first, others] if others else first, members, costs)
+    rows = [
+        _robot_row(robot, members, costs, own) for (robot,), own in zip(first, shown, strict=False)
+    ]
     if others:
         without = len(rest) - len(others)
         name = counted(len(rest), "other robot")
         name += f"<small>{without} of them in no sum</small>" if without else ""
-        rows.append((name, *_sums(others, members, costs), DASH))
+        rows.append((name, *_sums(others, members, costs, shown[-1]), DASH))
     summed = [robot for robot in robots if not robot.drives_only]
     if len(summed) > 1:
         recordings = counted(sum(robot.recordings for robot in summed), "file")
@@ -802,6 +814,71 @@ def _robots(members: Sequence[Member], robots: Sequence[Robot], costs: Costs) ->
     return f'{table(_ROBOT_HEADS, rows, "Robots")}<p class="hint">{hint}</p>'
 
 
+@dataclass(frozen=True)
+class _Shown:
+    """Money of a robot or of several in the columns of the table, as parts of the row of all; ""
+    where it is rounded by itself. parts: of what is left.
+    """
+
+    now: str = ""
+    reached: str = ""
+    left: str = ""
+    parts: tuple[str, ...] = ()
+
+
+_ALONE = _Shown()
+
+
+def _adding_up(
+    groups: Sequence[Sequence[Robot]], members: Sequence[Member], costs: Costs
+) -> list[_Shown]:
+    """Of each row of the table, each row robots of its own."""
+    summed = [[robot for robot in group if not robot.drives_only] for group in groups]
+    everyone = [robot for group in summed for robot in group]
+    if len(everyone) < len(summed):
+        summed = [group for group in summed if group]
+    columns = []
+    for of in (_now_of, _reached_of, _left_of):
+        parts = [of(group, members, costs) for group in summed]
+        columns.append(_parts_shown(parts, of(everyone, members, costs), costs))
+    shown = iter(
+        _Shown(now[0], reached[0], left[0], tuple(left[1]))
+        for now, reached, left in zip(*columns, strict=True)
+    )
+    return [next(shown) if any(not r.drives_only for r in group) else _ALONE for group in groups]
+
+
+def _parts_shown(
+    groups: Sequence[Sequence[Amount]], total: Sequence[Amount], costs: Costs
+) -> list[tuple[str, list[str]]]:
+    """Each group of amounts as parts of a total; "" where they are none, as it is open of one."""
+    values = [[amount.value for amount in group] for group in groups]
+    whole = sum_of(total) if total else Amount.of_value(0.0)
+    known = math.fsum(value for group in values for value in group)
+    if not math.isclose(known, whole.value, rel_tol=1e-9):
+        return [("", []) for _ in groups]
+    found = groups_adding_up(values, costs.currency, larger_end(whole))
+    return [each if values[k] else ("", []) for k, each in enumerate(found)]
+
+
+def _now_of(robots: Sequence[Robot], _: Sequence[Member], costs: Costs) -> list[Amount]:
+    return [sum_of([robot.now for robot in robots]).of(costs.money)] if robots else []
+
+
+def _reached_of(robots: Sequence[Robot], _: Sequence[Member], costs: Costs) -> list[Amount]:
+    """None where nothing is reached, or it is open, or more was taken."""
+    reached = [robot.reached for robot in robots if robot.reached is not None]
+    saved = sum_of(reached) if reached else None
+    if saved is None or saved.doubt or saved.value < 0.0:
+        return []
+    return [Amount.of_value(costs.money(saved.value))]
+
+
+def _left_of(robots: Sequence[Robot], members: Sequence[Member], costs: Costs) -> list[Amount]:
+    known = [member for robot in robots for member in _own(members, robot)]
+    return [money for money, _ in _parts_left(robots, _idle_saving(known, costs), costs)]
+
+
 def _all_robots(members: Sequence[Member], robots: Sequence[Robot], costs: Costs) -> str:
     """Every robot, folded; "" where the first table has them."""
     if len(robots) <= _MOST_ROBOTS:
@@ -811,7 +888,9 @@ def _all_robots(members: Sequence[Member], robots: Sequence[Robot], costs: Costs
     return folded(_section(name, table(_ROBOT_HEADS, rows, name)))
 
 
-def _robot_row(robot: Robot, members: Sequence[Member], costs: Costs) -> tuple[str, ...]:
+def _robot_row(
+    robot: Robot, members: Sequence[Member], costs: Costs, shown: _Shown = _ALONE
+) -> tuple[str, ...]:
     own = _own(members, robot)
     idle = None if robot.drives_only else _idle_saving(own, costs)
     part = robot.joules / costs.parts_per_cycle
@@ -823,9 +902,9 @@ def _robot_row(robot: Robot, members: Sequence[Member], costs: Costs) -> tuple[s
     today = f"<small>{COMMON}, predicted</small>" if _stands(robot) else ""
     return (
         f"{text(robot.name)}<small>{text(made)}</small><small>{text(each)}</small>",
-        f"{_yearly(robot.now, costs)}{today}",
-        _saved(robot.reached, costs),
-        _left([robot], idle, costs),
+        f"{_yearly(robot.now, costs, shown.now)}{today}",
+        _saved(robot.reached, costs, shown.reached),
+        _left([robot], idle, costs, shown),
         text(_first_lever(robot, own, idle, costs)),
     )
 
@@ -846,20 +925,27 @@ def _first_lever(robot: Robot, own: Sequence[Member], idle: IdleSaving | None, c
     return max(found)[1] if found else DASH
 
 
-def _sums(robots: Sequence[Robot], members: Sequence[Member], costs: Costs) -> tuple[str, ...]:
+def _sums(
+    robots: Sequence[Robot],
+    members: Sequence[Member],
+    costs: Costs,
+    shown: _Shown = _ALONE,
+) -> tuple[str, ...]:
     """Costs, energy and savings of several robots."""
     reached = [robot.reached for robot in robots if robot.reached is not None]
     known = [member for robot in robots for member in _own(members, robot)]
     return (
-        _yearly(sum_of([robot.now for robot in robots]), costs),
-        _saved(sum_of(reached) if reached else None, costs),
-        _left(robots, _idle_saving(known, costs), costs),
+        _yearly(sum_of([robot.now for robot in robots]), costs, shown.now),
+        _saved(sum_of(reached) if reached else None, costs, shown.reached),
+        _left(robots, _idle_saving(known, costs), costs, shown),
     )
 
 
-def _left(robots: Sequence[Robot], idle: IdleSaving | None, costs: Costs) -> str:
+def _parts_left(
+    robots: Sequence[Robot], idle: IdleSaving | None, costs: Costs
+) -> list[tuple[Amount, str]]:
     """What rest outside of the shifts, plans that nobody drove and runs at their plan's energy
-    would save, together and each.
+    would save, each with its words.
     """
     plans = [r.saved for r in robots if not r.driven and r.saved is not None]
     open_plans = sum_of(plans).of(costs.money) if plans else None
@@ -873,11 +959,22 @@ def _left(robots: Sequence[Robot], idle: IdleSaving | None, costs: Costs) -> str
         parts.append(
             (Amount.of_value(above), "above its plan" if len(robots) == 1 else "above plans")
         )
+    return parts
+
+
+def _left(
+    robots: Sequence[Robot], idle: IdleSaving | None, costs: Costs, shown: _Shown = _ALONE
+) -> str:
+    """The same together, and each."""
+    parts = _parts_left(robots, idle, costs)
     if not parts:
         return DASH
-    shown = _money(sum_of([money for money, _ in parts]), costs)
-    named = [f"{money_of(money, costs.currency)} {words}" for money, words in parts]
-    return f"{shown}<small>{text(', '.join(named))}</small>"
+    whole = sum_of([money for money, _ in parts])
+    values = shown.parts or adding_up(
+        [money.value for money, _ in parts], costs.currency, larger_end(whole)
+    )
+    named = [f"{value} {words}" for value, (_, words) in zip(values, parts, strict=True)]
+    return f"{_money(whole, costs, shown.left)}<small>{text(', '.join(named))}</small>"
 
 
 _NAMED = 5  # robots in a sentence
@@ -1011,14 +1108,15 @@ def _shown(name: str) -> str:
     return name.replace("_", " ").lower() if name.isupper() else modes_as_words(name)
 
 
-def _yearly(amount: Amount, costs: Costs) -> str:
-    """Price of a year with its interval, and its energy."""
+def _yearly(amount: Amount, costs: Costs, shown: str = "") -> str:
+    """Price of a year with its interval, and its energy; shown: as a part of a sum."""
     energy = f"<small>{text(kilowatt_hours(amount.value))}</small>"
-    return f"{_money(amount.of(costs.money), costs)}{energy}"
+    return f"{_money(amount.of(costs.money), costs, shown)}{energy}"
 
 
-def _money(price: Amount, costs: Costs) -> str:
-    return f"<b>{text(money_of(price, costs.currency))}</b>{_small_ends(price, costs)}"
+def _money(price: Amount, costs: Costs, shown: str = "") -> str:
+    value = shown or money_of(price, costs.currency)
+    return f"<b>{text(value)}</b>{_small_ends(price, costs)}"
 
 
 def _small_ends(price: Amount, costs: Costs) -> str:
@@ -1028,15 +1126,17 @@ def _small_ends(price: Amount, costs: Costs) -> str:
     return f"<small>{text(ends)} {text(costs.currency)}</small>"
 
 
-def _saved(amount: Amount | None, costs: Costs) -> str:
-    """What is saved, with its interval; where zero lies in it, that it is open."""
+def _saved(amount: Amount | None, costs: Costs, shown: str = "") -> str:
+    """What is saved, with its interval; where zero lies in it, that it is open. shown: as a part of
+    a sum.
+    """
     if amount is None:
         return DASH
     word, amount = amount.gain()
     between = _small_ends(amount.of(costs.money), costs)
     if amount.doubt:
         return f'<span title="{text(amount.doubt)}">open</span>{between}'
-    price = yearly_money(costs.money(amount.value), costs.currency)
+    price = shown or yearly_money(costs.money(amount.value), costs.currency)
     energy = f"{kilowatt_hours(amount.value)}{' more' if word == 'more' else ''}"
     return f"<b>{text(price)}</b><small>{text(energy)}</small>{between}"
 

@@ -40,7 +40,7 @@ from ir_recorder.report.costs import (
     recorded_idle_saving,
 )
 from ir_recorder.report.methods import counted
-from ir_recorder.report.money_text import yearly_money
+from ir_recorder.report.money_text import adding_up, yearly_money
 from ir_recorder.report.number_text import (
     interval,
     kilograms,
@@ -312,11 +312,10 @@ def year_in_words(
     rest, how = (
         (idle.deepest, f"in {idle.mode}") if planned else (idle.left_alone, "on closed brakes")
     )
-    outside = yearly_money(rest, costs.currency)
+    inside, outside = adding_up((shifts, rest), costs.currency)
     return (
         f"{yearly_money(shifts + rest, costs.currency)} a year",
-        f"{yearly_money(shifts, costs.currency)} in shifts ({taken}), {outside} at night and at "
-        f"weekends, {how}.",
+        f"{inside} in shifts ({taken}), {outside} at night and at weekends, {how}.",
     )
 
 

@@ -85,6 +85,57 @@ def money_of(amount: Amount, currency: str) -> str:
     return yearly_money(amount.value, currency)
 
 
+def adding_up(
+    parts: Sequence[float], currency: str, most: float = 0.0, *, yearly: bool = True
+) -> list[str]:
+    """Parts of an amount, rounded so that what is shown adds up to their sum as it is shown, of a
+    year or as `money` has it (method of the largest remainder). most: the larger end of the sum's
+    interval, where it stands beside one.
+    """
+    shown = groups_adding_up([[part] for part in parts], currency, most, yearly=yearly)
+    return [whole for whole, _ in shown]
+
+
+def groups_adding_up(
+    groups: Sequence[Sequence[float]], currency: str, most: float = 0.0, *, yearly: bool = True
+) -> list[tuple[str, list[str]]]:
+    """The same of groups of parts: the sum of each group, and its parts."""
+    show = _yearly_digits if yearly else _digits
+    parts = [part for group in groups for part in group]
+    if not all(map(math.isfinite, parts)):
+        return [(DASH, [DASH for _ in group]) for group in groups]
+    total = math.fsum(parts)
+    decimals = 0 if most >= NO_CENTS else len(show(total).partition(".")[2])
+    units = [part * 10.0**decimals for part in parts]
+    counts = [math.floor(unit) for unit in units]
+    missing = round(float(f"{total:.{decimals}f}") * 10.0**decimals) - sum(counts)
+    for k in sorted(range(len(units)), key=lambda k: counts[k] - units[k])[:missing]:
+        counts[k] += 1
+    kind = "a" if yearly else "b"
+
+    def shown(first: int, many: int) -> str:
+        value = sum(counts[first : first + many]) * 10.0**-decimals
+        words = f"{value:,.{decimals}f} {currency}".replace(",", " ")
+        place = float(_PLACES * first + many)
+        return _carried(kind, (*parts, most, place), words, currency)
+
+    found = []
+    first = 0
+    for group in groups:
+        own = [shown(first + k, 1) for k in range(len(group))]
+        found.append((shown(first, len(group)), own))
+        first += len(group)
+    return found
+
+
+_PLACES = 1000  # more than parts: where a group begins, times this, and how many parts it has
+
+
+def larger_end(amount: Amount) -> float:
+    """The larger end of an amount's interval; 0 without one."""
+    return max(abs(amount.low), abs(amount.high)) if amount.low < amount.high else 0.0
+
+
 def yearly_span(low: float, high: float, currency: str, least: float = NOTHING) -> str:
     """The ends of an amount of a year, without its currency: both whole where one is shown so; 0
     for one below `least`.

@@ -24,6 +24,7 @@ from ir_recorder.report.costs import (
 )
 from ir_recorder.report.money_text import (
     NOTHING,
+    adding_up,
     money_of,
     price_field,
     yearly_money,
@@ -60,7 +61,6 @@ driven, and what is left.
 ABOVE = "find what the run takes above its plan"
 """What to do about a run that took more than its plan predicts."""
 ABOVE_LEAST = 0.01  # of the common program: less is nothing to look for
-_ROUNDED = " Each amount is rounded by itself."
 _COMMON = " Common program: the same stations by PTP at 100 %, its pauses left to the controller."
 
 
@@ -218,7 +218,7 @@ class Paid:
         spread = any(row.whisker[0] < row.whisker[1] for row in rows)
         whisker = " Whisker: 90 % interval." if spread else ""
         common = _COMMON if self.before.startswith(COMMON) else ""
-        hint = f"In full colour: in shifts{self.counted}.{pale}{whisker}{common}{_ROUNDED}"
+        hint = f"In full colour: in shifts{self.counted}.{pale}{whisker}{common}"
         return (
             f'<section id="year"><h2>Energy costs of a year</h2>'
             f'{bars(rows, "energy costs of a year")}<p class="hint">{text(hint)}</p></section>'
@@ -407,7 +407,7 @@ def _year_row(
     """A bar of a year: money in shifts, and outside of them; rests: how, in words, which belongs
     to the name, as the same program with other nights is another year.
     """
-    shifts, nights = (yearly_money(each, costs.currency) for each in money)
+    shifts, nights = adding_up(money, costs.currency)
     pieces = [Piece(style, "in shifts", money[0])]
     parts = ""
     if money[1] > 0.0:

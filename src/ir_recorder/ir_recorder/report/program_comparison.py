@@ -42,7 +42,7 @@ from ir_recorder.report.costs import (
     share_between,
 )
 from ir_recorder.report.files import write_output
-from ir_recorder.report.money_text import money_of, yearly_money, yearly_span
+from ir_recorder.report.money_text import adding_up, larger_end, money_of, yearly_money, yearly_span
 from ir_recorder.report.motion_scene import common_rests, in_step, motion_of, power_curves, rests_of
 from ir_recorder.report.number_text import (
     DASH,
@@ -330,14 +330,21 @@ def change_table(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
         where = f"at night and at weekends<small>{WORK[MODE]}, {idle.basis}</small>"
         priced.insert(0, (idle.money, (where, text(words), DASH)))
     most = max((price.value for price, _ in priced), default=0.0)
-    rows = [
-        (f"{k}. {where}", *cells, _price(price, costs), bar(price.value, most, "planned"))
-        for k, (price, (where, *cells)) in enumerate(priced, start=1)
-    ]
     whole_year = _paid(found, cell, costs).year(costs).money
     rest = whole_year.value - sum(price.value for price, _ in priced)
-    if rows and whole_year.value > 0.0:
-        other = text(yearly_money(rest, costs.currency))
+    shown = [money_of(price, costs.currency) for price, _ in priced]
+    summed = bool(priced) and whole_year.value > 0.0
+    if summed:
+        parts = [*(price.value for price, _ in priced), rest]
+        shown = adding_up(parts, costs.currency, larger_end(whole_year))
+    rows = [
+        (f"{k}. {where}", *cells, _price(price, costs, own), bar(price.value, most, "planned"))
+        for k, ((price, (where, *cells)), own) in enumerate(
+            zip(priced, shown, strict=False), start=1
+        )
+    ]
+    if summed:
+        other = text(shown[-1])
         saved = found.planned.saving.saved
         left = saved - sum(change.saving.saved for change in found.changes)
         cells = (text(watt_hours(left)), other, bar(rest, most, "planned"))
@@ -349,10 +356,11 @@ def change_table(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     return none + (table(heads, rows, "Changes") if rows else "")
 
 
-def _price(amount: Amount, costs: Costs) -> str:
-    """Money of a year with its interval."""
+def _price(amount: Amount, costs: Costs, shown: str = "") -> str:
+    """Money of a year with its interval; shown: as a part of a sum."""
     ends = f"{yearly_span(amount.low, amount.high, costs.currency)} {costs.currency}"
-    return _cell(money_of(amount, costs.currency), ends if amount.high > amount.low else "")
+    value = shown or money_of(amount, costs.currency)
+    return _cell(value, ends if amount.high > amount.low else "")
 
 
 def _change(change: StepChange) -> tuple[str, ...]:

@@ -36,6 +36,7 @@ from ir_recorder.report.costs import (
     following_price,
     idle_saving,
     money_of_thousand,
+    moneys_of_thousand,
 )
 from ir_recorder.report.files import write_output
 from ir_recorder.report.gantt import Bar, Gantt, legend, mode_bars, together
@@ -238,23 +239,25 @@ def _table(analyses: Mapping[str, Analysis], cycle: Production | None, costs: Co
     heads = ("robot", ">a part", ">energy", ">predicted", ">time", ">waited for signals", ">peak")
     every = analyses.values()
     span = _whole(analyses)
+    parts = [_part(_taken(analysis, span), cycle, costs) for analysis in every]
+    moneys = moneys_of_thousand(parts, costs)
     rows = [
         (
             f'<a href="{text(robot)}.html">{text(robot)}</a>'
             f"<small>{counted(len(analysis.steps), 'step')}</small>",
-            _part(_taken(analysis, span), cycle, costs),
+            _part_cell(part, money),
             watt_hours(driven_joules(analysis)),
             watt_hours(predicted_joules(analysis)),
             seconds(program_span(analysis).seconds),
             seconds(sum(waited(analysis).values())),
             watts(analysis.peak_power),
         )
-        for robot, analysis in analyses.items()
+        for (robot, analysis), part, money in zip(analyses.items(), parts, moneys, strict=True)
     ]
     rows.append(
         (
             f"<b>all together</b><small>{sum(len(a.steps) for a in every)} steps</small>",
-            _part(sum(_taken(analysis, span) for analysis in every), cycle, costs),
+            _part_cell(sum(parts), money_of_thousand(sum(parts), costs)),
             watt_hours(sum(map(driven_joules, every))),
             watt_hours(sum(map(predicted_joules, every))),
             seconds(span.seconds),
@@ -271,12 +274,16 @@ def _table(analyses: Mapping[str, Analysis], cycle: Production | None, costs: Co
     return f'{table(heads, rows, "Robots")}<p class="hint">{hint}</p>'
 
 
-def _part(joules: float, cycle: Production | None, costs: Costs) -> str:
-    """Energy and money of a part, of so many joules of the run."""
-    if cycle is None or not np.isfinite(joules):
+def _part(joules: float, cycle: Production | None, costs: Costs) -> float:
+    """Joules of a part, of so many of the run; NaN where they aren't known."""
+    return np.nan if cycle is None else joules / cycle.cycles / costs.parts_per_cycle
+
+
+def _part_cell(joules: float, money: str) -> str:
+    """Energy and money of a part."""
+    if not np.isfinite(joules):
         return DASH
-    part = joules / cycle.cycles / costs.parts_per_cycle
-    return f"<b>{watt_hours(part)}</b><small>{text(money_of_thousand(part, costs))}</small>"
+    return f"<b>{watt_hours(joules)}</b><small>{text(money)}</small>"
 
 
 def program_span(analysis: Analysis) -> Span:
