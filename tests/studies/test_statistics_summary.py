@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ir_recorder.report.number_text import DASH
+from ir_recorder.report.costs import Costs
+from ir_recorder.report.money_text import money
+from ir_recorder.report.number_text import DASH, kilowatt_hours
 from ir_studies.statistics.findings import NO_PAIR, NOT_DRIVEN, failures_of, findings_of
 from ir_studies.statistics.outputs import (
     FEW,
@@ -235,3 +237,33 @@ def test_what_is_off_is_no_green_badge_and_pairs_without_a_plan_are_said() -> No
     page = page_html(findings_of([*pairs(*shares), lost]), ASKED)
     assert '<p class="verdict open">7.3 % too low</p>' in page
     assert "1 of 21 pairs could not be planned." in page
+
+
+@pytest.mark.parametrize("driven", [True, False])
+def test_a_manager_reads_what_movements_cost(driven: bool) -> None:
+    """The page had percent alone: no kWh, and no money but of 100 EUR."""
+    rows = pairs(0.1, 0.2, -0.1, 0.3)
+    for row in rows:
+        for side in SIDES:
+            scale = 36.0  # of 100 J: 3.6 kJ, so that 1 000 movements are 1 kWh
+            figures = ("direct_j", "indirect_j", "predicted_j")
+            row[side] |= {name: scale * row[side][name] for name in figures}
+            if not driven:
+                row[side] |= {"direct_j": float("nan"), "indirect_j": float("nan")}
+    found = findings_of(rows)
+    answer = page_html(found, ASKED).split('<section id="answer">')[1].partition("</section>")[0]
+    costs = Costs()
+    if driven:
+        (each,) = (one for one in found.agreements if one.name.startswith("predicted"))
+        meter, predicted = each.levels[1], each.levels[0]
+    else:
+        (each,) = (one for one in found.comparisons if one.name == "energy, predicted")
+        meter = predicted = each.levels[1]
+    for joules in {meter, predicted}:
+        words = f"{kilowatt_hours(1000.0 * joules)}, {money(costs.money(1000.0 * joules), 'EUR')}"
+        assert words in answer
+    assert "at 0.2 EUR/kWh, assumed" in answer
+    assert ("on the meter" in answer) == driven
+    assert "With asynchronous joints 1 000 take " in answer
+    shown = any(one.shown for one in found.comparisons if one.name.startswith("energy"))
+    assert ("which is not shown" in answer) != shown

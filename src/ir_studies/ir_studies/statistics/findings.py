@@ -89,10 +89,12 @@ def _not_driven(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
                 yield NOT_DRIVEN, str(row[timing].get("message", "") or "no reading of the meter")
 
 
+PREDICTED = "energy, predicted"
+DIRECT = "energy, direct"
 NATURAL = (
     ("duration", "duration_s", "s"),
-    ("energy, predicted", "predicted_j", "J"),
-    ("energy, direct", "direct_j", "J"),
+    (PREDICTED, "predicted_j", "J"),
+    (DIRECT, "direct_j", "J"),
     ("energy, indirect", "indirect_j", "J"),
     ("peak power", "peak_w", "W"),
     ("path of the tcp", "path_m", "m"),

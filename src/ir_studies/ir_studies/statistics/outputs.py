@@ -11,15 +11,25 @@ import numpy as np
 from ir_recorder.analysis.intervals import ALIKE, LEVEL, Mean
 from ir_recorder.report.answer import Answer
 from ir_recorder.report.bars import tick_step
+from ir_recorder.report.costs import Costs
 from ir_recorder.report.files import write_output
 from ir_recorder.report.methods import counted
-from ir_recorder.report.number_text import DASH, significant, text
+from ir_recorder.report.money_text import money, price_of
+from ir_recorder.report.number_text import DASH, kilowatt_hours, significant, text
 from ir_recorder.report.page import PAGE_START, folded
 from ir_recorder.report.shell import SIMULATED, source_badge
 from ir_recorder.report.step_table import write_columns
 from ir_recorder.report.tables import table
 from ir_studies.page import Head, page, settings_table
-from ir_studies.statistics.findings import ASYNCHRONOUS, SYNCHRONOUS, Comparison, Findings, number
+from ir_studies.statistics.findings import (
+    ASYNCHRONOUS,
+    DIRECT,
+    PREDICTED,
+    SYNCHRONOUS,
+    Comparison,
+    Findings,
+    number,
+)
 from ir_studies.statistics.settings import DRAWN, StatisticsSettings
 from ir_studies.work import Row
 from ir_values.files import ANYWHERE
@@ -387,7 +397,9 @@ def _answer(found: Findings) -> Answer | None:
     """
     result, words = _predicted(found)
     if not result:
-        return Answer(_timings(found), "", _SCOPE) if found.solved > found.same else None
+        if found.solved == found.same:
+            return None
+        return Answer(_timings(found), "", _SCOPE, "", _a_thousand(found))
     each = _against_direct(found)
     assert each is not None
     sure = [f"{counted(found.driven, 'movement')} between {counted(each.pairs, 'pair')} of places"]
@@ -405,13 +417,42 @@ def _answer(found: Findings) -> Answer | None:
         )
     if not any(one.shown for one in found.comparisons):
         advice.append("Take either timing: neither is shown to be better.")
-    return Answer(
-        result, f"{words} {_timings(found)}.", sure, advice, _in_money(each.mean), between
-    )
+    costs = [*_a_thousand(found), *_in_money(each.mean)]
+    return Answer(result, f"{words} {_timings(found)}.", sure, advice, costs, between)
 
 
 BOTH_ONCE = "by both timings, once where these move alike"
 """Which movements of a pair are driven."""
+
+
+def _a_thousand(found: Findings) -> list[str]:
+    """What a thousand movements take and cost, on the meter where it is known and as predicted, and
+    what asynchronous joints change of it; none where no energy is known.
+    """
+    costs = Costs()
+
+    def said(joules: float) -> str:
+        return f"{kilowatt_hours(1000.0 * joules)}, {money(costs.money(1000.0 * joules), 'EUR')}"
+
+    price = f"at {price_of(costs.price, costs.currency)}, assumed"
+    each = _against_direct(found)
+    predicted = next((one for one in found.comparisons if one.name == PREDICTED), None)
+    if each is not None:
+        lines = [
+            f"1 000 such movements: {said(each.levels[1])} on the meter ({price}); predicted "
+            f"{said(each.levels[0])}."
+        ]
+    elif predicted is not None and math.isfinite(predicted.levels[1]):
+        lines = [f"1 000 such movements: {said(predicted.levels[1])} ({price}), predicted."]
+    else:
+        return []
+    timed = next((one for one in found.comparisons if one.name == DIRECT and one.count), predicted)
+    if timed is not None and timed.count:
+        less = timed.levels[1] - timed.levels[0]
+        kind = "less" if less >= 0.0 else "more"
+        shown = "" if timed.shown else ", which is not shown"
+        lines.append(f"With asynchronous joints 1 000 take {said(abs(less))} {kind}{shown}.")
+    return lines
 
 
 def _in_money(off: Mean) -> list[str]:
