@@ -292,6 +292,41 @@ def test_paper_from_a_phone_has_every_section_that_paper_from_a_desk_has(
     assert set(printed["desk"]) == set(printed["phone"])
 
 
+INK = """(() => {
+    const canvas = document.getElementById('power');
+    if (!canvas.width || !canvas.height) return 0;
+    const all = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+    return all.filter((value, k) => k % 4 === 3 && value > 0).length;
+})()"""
+"""Pixels of the chart of power that are drawn."""
+
+
+def test_curves_are_closed_on_a_phone_and_drawn_when_they_are_opened_or_printed(
+    browser: Any, analysis: Analysis, tmp_path: Path
+) -> None:
+    """A report was 7 screens of a phone long before its first heading for engineers."""
+    path = tmp_path / "page.html"
+    path.write_text(report(analysis), encoding="utf-8")
+    for printed in (False, True):
+        page = browser.open(path, *SIZES["phone"], touch=True)
+        assert page.run("document.getElementById('over-time').tagName") == "DETAILS"
+        assert page.run("document.getElementById('over-time').open") is False
+        assert page.run("document.getElementById('motion').tagName") == "SECTION"
+        if printed:
+            page.call("Emulation.setEmulatedMedia", media="print")
+            page.size(*SIZES["paper"])
+            page.run("dispatchEvent(new Event('beforeprint'))")
+        else:
+            page.run("document.querySelector('#over-time > summary').click()")
+            page.frame()
+            page.frame()
+        assert page.run(INK) > 1000
+        page.close()
+    page = browser.open(path, *SIZES["desk"])
+    assert page.run("document.getElementById('over-time').tagName") == "SECTION"
+    page.close()
+
+
 def page_pictures() -> ModuleType:
     """The tool that draws pages; the fixture of the browser has loaded the module that it needs."""
     path = ROOT / "tools" / "page_pictures.py"

@@ -130,13 +130,13 @@ function exportButtons() {
   }
 }
 
-/* On a telephone: what comes after the answer opens when its heading is chosen; curves and pictures stay. Paper has what a desk has. */
+/* On a telephone: what comes after the answer opens when its heading is chosen, curves over time too; the cell in 3D stays. Paper has what a desk has. */
 const FIRST = ["answer", "year", "moved", "measurements", "ranking"];
 function foldOnPhones(kept) {
   if (!matchMedia("(max-width: 700px)").matches) return;
   for (const section of document.querySelectorAll("main > section[id]")) {
     const head = section.querySelector(":scope > h2");
-    if (!head || kept.includes(section.id) || section.querySelector("canvas")) continue;
+    if (!head || kept.includes(section.id) || section.querySelector(".stage")) continue;
     const part = document.createElement("details"), summary = document.createElement("summary");
     part.className = "part paper";
     part.id = section.id;
