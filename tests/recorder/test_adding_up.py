@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from ir_recorder import Analysis, findings
 from ir_recorder.analysis.production import PREDICTED, Amount
 from ir_recorder.report import report_html
+from ir_recorder.report.compare import comparison_html
 from ir_recorder.report.costs import Costs
 from ir_recorder.report.fleet import Member, fleet_html, member_of
 from ir_recorder.report.money_text import (
@@ -127,6 +128,12 @@ def test_tables_of_a_bill_add_up(analysis: Analysis, scattered: Scattered, seed:
         whole = saved["saved together"][column]
         if all(EUR.search(words) for words in (*parts, whole)):
             assert sum(map(shown, parts)) == pytest.approx(shown(whole), abs=1e-9)
+    pair = [(analysis, findings(analysis))] * 2
+    side = rows_of(plain(comparison_html(pair, costs=costs)), "For those who pay")
+    parts = [side["saved by its plan, a year"], side["saved at night and at weekends, a year"]]
+    for column in (1, 2):
+        each = sum(shown(row[column]) for row in parts)
+        assert each == pytest.approx(shown(side["both together, a year"][column]), abs=1e-9)
     both = plain(robots_html({"left": analysis, "right": analysis}, (), costs))
     parts_of = rows_of(both, "Robots")
     each = sum(shown(parts_of[name][1]) for name in ("left", "right"))

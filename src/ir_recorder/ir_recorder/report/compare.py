@@ -37,12 +37,14 @@ from ir_recorder.report.costs import (
     following_price,
     origin_of,
     own_pace,
+    payback,
     recorded_idle_saving,
     saved_year,
 )
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import checked, plant_of
 from ir_recorder.report.money_text import (
+    adding_up,
     money_of,
     span_of_money,
     yearly_money,
@@ -155,7 +157,8 @@ def _answer(analyses: Sequence[Analysis], names: Sequence[str], costs: Costs) ->
     first = known[names[0]]
     least = min(known, key=lambda name: known[name].value)
     said = [f"{name} {yearly_money(known[name].value, costs.currency)}" for name in names[:_NAMED]]
-    words = f"A year in shifts: {', '.join(said)}."
+    words = f"A year in shifts: {', '.join(said)}"
+    paid: list[str] = []
     intervals = [
         f"{name} {yearly_span(year.low, year.high, costs.currency)} {costs.currency}"
         for name, year in list(known.items())[:_NAMED]
@@ -177,6 +180,7 @@ def _answer(analyses: Sequence[Analysis], names: Sequence[str], costs: Costs) ->
         less = yearly_money(first.value - known[least].value, costs.currency)
         result = f"{least}: {less} less a year"
         do.append(f"Drive {least}.")
+        paid.append(payback(_less(first, known[least]), costs))
     elif pair:  # the run lies in the interval of the plan
         off = percent(known[driven[0]].value / _other(known, driven[0]).value - 1.0)
         result = f"The run costs what its plan predicts, {off}"
@@ -188,7 +192,14 @@ def _answer(analyses: Sequence[Analysis], names: Sequence[str], costs: Costs) ->
     if idle is not None:
         do += first_steps((), idle, costs)
         sure.append(f"What nights save is {idle.basis}.")
-    return Answer(result, words, sure, do, a_night(idle, costs), counted=counted_at(costs))
+        paid.append(f"what nights save {payback(idle.money, costs)}")
+    words = "; ".join((words, *paid))
+    return Answer(result, f"{words}.", sure, do, a_night(idle, costs), counted=counted_at(costs))
+
+
+def _less(first: Amount, least: Amount) -> Amount:
+    """What a year of the second costs less than one of the first."""
+    return Amount(first.value - least.value, first.low - least.high, first.high - least.low)
 
 
 def _other(known: Mapping[str, Amount], name: str) -> Amount:
@@ -246,8 +257,7 @@ def _paid(compared: Sequence[Compared], names: Sequence[str], costs: Costs) -> s
     first = None if _apart(analyses) else cycles[0]
     rows = [
         ("a year of such cycles", *(_year(cycle, first, costs) for cycle in cycles)),
-        ("saved by its plan, a year", *(_year_saved(cycle, costs) for cycle in cycles)),
-        *_around_the_clock(analyses, cycles, costs),
+        *_saved_rows(analyses, cycles, costs),
         ("a cycle", *(_cycle(cycle) for cycle in cycles)),
         ("plant", *(text(plant_of(a)) for a, _ in compared)),
         ("checks", *(text(checked(checks, a)[1]) for a, checks in compared)),
@@ -302,7 +312,7 @@ def _year(cycle: Production | None, first: Production | None, costs: Costs) -> s
     return f"{shown}<small>{percent(year / costs.energy_of_year(first).value - 1.0)}</small>"
 
 
-def _year_saved(cycle: Production | None, costs: Costs) -> str:
+def _year_saved(cycle: Production | None, costs: Costs, shown: str) -> str:
     amount = costs.saving_of_year(cycle) if cycle is not None else None
     if cycle is None or cycle.savings is None or amount is None:
         return DASH
@@ -317,43 +327,55 @@ def _year_saved(cycle: Production | None, costs: Costs) -> str:
     if price.high > price.low:
         lines.insert(0, f"{yearly_span(price.low, price.high, costs.currency)} {costs.currency}")
     small = "".join(f"<small>{text(line)}</small>" for line in lines if line)
-    return f"<b>{text(yearly_money(price.value, costs.currency))}</b>{small}"
+    return f"<b>{text(shown or yearly_money(price.value, costs.currency))}</b>{small}"
 
 
-def _around_the_clock(
+def _saved_rows(
     analyses: Sequence[Analysis], cycles: Sequence[Production | None], costs: Costs
 ) -> list[tuple[str, ...]]:
-    """Rows of what rest saves outside of the shifts, and of both together; none where it is not
-    known of any.
+    """Rows of what plans save, what rest saves outside of the shifts, and of both together; those
+    of rest are left out where it is not known of any.
     """
     found = [
         None if cycle is None else recorded_idle_saving(analysis, costs)
         for analysis, cycle in zip(analyses, cycles, strict=True)
     ]
-    if not any(found):
-        return []
     saved = [None if cycle is None else costs.saving_of_year(cycle) for cycle in cycles]
+    shown = [
+        ("", "")
+        if idle is None or amount is None or amount.value < 0.0
+        else adding_up((costs.money(amount.value), idle.saved), costs.currency)
+        for idle, amount in zip(found, saved, strict=True)
+    ]
+    by_plan = [_year_saved(cycle, costs, own[0]) for cycle, own in zip(cycles, shown, strict=True)]
+    rows = [("saved by its plan, a year", *by_plan)]
+    if not any(found):
+        return rows
     idle = next(each for each in found if each is not None)
     words = (
         f"{idle.mode} ({watts(idle.watts_deepest)}) instead of closed brakes "
         f"({watts(idle.watts_left_alone)}), {idle.basis}"
     )
     said = f"<small>{text(words)}</small>"
-    nights = (DASH if idle is None else _night(idle, costs) for idle in found)
+    nights = (
+        DASH if idle is None else _night(idle, costs, own[1])
+        for idle, own in zip(found, shown, strict=True)
+    )
     both = (
         DASH if idle is None or amount is None else _both(amount, idle, costs)
         for idle, amount in zip(found, saved, strict=True)
     )
     return [
+        *rows,
         (f"saved at night and at weekends, a year{said}", *nights),
         ("both together, a year", *both),
     ]
 
 
-def _night(idle: IdleSaving, costs: Costs) -> str:
+def _night(idle: IdleSaving, costs: Costs, shown: str) -> str:
     ends = span_of_money(idle.money, costs.currency)
     small = f"<small>{text(ends)}</small>" if ends else ""
-    return f"<b>{text(money_of(idle.money, costs.currency))}</b>{small}"
+    return f"<b>{text(shown or money_of(idle.money, costs.currency))}</b>{small}"
 
 
 def _both(amount: Amount, idle: IdleSaving, costs: Costs) -> str:

@@ -37,6 +37,7 @@ from ir_recorder.report.costs import (
     idle_saving,
     money_of_thousand,
     moneys_of_thousand,
+    payback,
 )
 from ir_recorder.report.files import write_output
 from ir_recorder.report.gantt import Bar, Gantt, legend, mode_bars, together
@@ -130,6 +131,8 @@ def _answer(
     idle = _idle_of_all(analyses, costs)
     taken = f"{kilowatt_hours(year.value)}, {kilograms(costs.co2(year.value))} CO2"
     result, words = year_in_words(year, idle, taken, costs)
+    hours = "" if idle is None else payback(idle.money, costs)
+    words += f" What nights save {hours}." if hours else ""
     part = cycle.energy / costs.parts_per_cycle
     each = f"Parts: {money_of_thousand(part, costs)}"
     rest = [f"What nights save is {idle.basis}."] if idle is not None else []
