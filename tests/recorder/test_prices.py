@@ -194,6 +194,32 @@ def test_what_is_reached_and_what_is_left_are_the_differences_of_the_bars(
     assert "ibernation" not in done
 
 
+@pytest.mark.parametrize("made", [report, fleet, mixed])
+def test_the_bill_of_today_stands_beside_the_planned_one(
+    analysis: Analysis, made: Callable[[Analysis, Costs], str]
+) -> None:
+    """It was in the middle of a sentence: what stands in the result is what the bars show."""
+    page = plain(made(analysis, Costs()))
+    answer = page.split('<section id="answer">')[1].partition("</section>")[0]
+    result = answer.partition('<div class="do">')[0]
+    bills = dict(re.findall(r"<dt>(.*?)</dt><dd>(.*?) a year</dd>", result))
+    names = list(bills)
+    assert names[0].startswith("common program")
+    assert names[-1].startswith("planned program")
+    assert names[1] in ("as driven", "today")
+    bars = bars_of(page)
+    for name, bill in bills.items():
+        assert shown_in(bill) in [money for label, money in bars.items() if label.startswith(name)]
+
+
+def test_pages_of_savings_say_what_hours_of_an_engineer_they_pay(analysis: Analysis) -> None:
+    costs = Costs(engineer_hour=37.0)
+    for made in PAGES:
+        page = plain(made(analysis, costs))
+        answer = page.split('<section id="answer">')[1].partition("</section>")[0]
+        assert re.search(r"pays for [\d.]+ h of an engineer a year \(37 EUR/h\)", answer), made
+
+
 def test_a_page_counts_one_number_of_cycles_a_year(
     analysis: Analysis, scattered: Callable[[Analysis, int], Analysis]
 ) -> None:

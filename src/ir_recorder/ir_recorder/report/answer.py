@@ -15,7 +15,8 @@ class Answer:
     """What a page says first: the result in a few large words and a sentence, its 90 % interval in
     words, how sure it is, what to do (in words, or several with the first first), and what a part
     and a night cost; "" and () where there is nothing to say. reached: what was saved already, of
-    which `do` is not; counted: what the amounts rest on (HTML).
+    which `do` is not; counted: what the amounts rest on (HTML); bills: what a
+    year costs, by the names of the programs, today's first.
     """
 
     result: str
@@ -26,13 +27,15 @@ class Answer:
     between: str = ""
     reached: Sequence[str] = ()
     counted: str = ""
+    bills: Sequence[tuple[str, str]] = ()
 
     def html(self) -> str:
         """As the first section of a page."""
         between = f'<p class="between">{text(self.between)}</p>' if self.between else ""
         words = f"<p>{text(self.words)}</p>" if self.words else ""
         parts = [
-            f'<div class="result"><h2>Result</h2><b>{text(self.result)}</b>{between}{words}</div>'
+            f'<div class="result"><h2>Result</h2><b>{text(self.result)}</b>{between}'
+            f"{self._bills()}{words}</div>"
         ]
         left = "Still to save" if self.reached else "What to do"
         todo = ""
@@ -49,6 +52,15 @@ class Answer:
         if self.counted:
             parts.append(f'<p class="counted">{self.counted}</p>')
         return f'<section id="answer">{"".join(parts)}</section>\n'
+
+    def _bills(self) -> str:
+        """The bills of a year beside each other; "" without one."""
+        if not self.bills:
+            return ""
+        each = "".join(
+            f"<div><dt>{text(name)}</dt><dd>{text(price)}</dd></div>" for name, price in self.bills
+        )
+        return f'<dl class="bills">{each}</dl>'
 
 
 def _said(words: Said, kind: str) -> str:

@@ -565,6 +565,7 @@ def _answer(paid: Paid, robots: Sequence[Robot], costs: Costs) -> Answer:
         paid.between_words(costs),
         done,
         counted_at(costs),
+        paid.bills(costs),
     )
 
 
@@ -684,13 +685,10 @@ UNDRIVEN = "plans that nobody drove: as planned"
 
 
 def _outside(idle: IdleSaving | None) -> str:
-    """What rest takes outside of the shifts, before and then."""
+    """What rest would take outside of the shifts."""
     if idle is None:
         return ""
-    return (
-        f"outside {watts(idle.watts_left_alone)} on closed brakes, {watts(idle.watts_deepest)} in "
-        f"{idle.mode}"
-    )
+    return f"at night and at weekends {watts(idle.watts_deepest)} in {idle.mode}"
 
 
 def _as_now(robots: Sequence[Robot]) -> str:

@@ -116,6 +116,7 @@ class Paid:
             self.between_words(costs),
             own if reached is not None else (),
             counted_at(costs),
+            self.bills(costs),
         )
 
     @property
@@ -138,18 +139,28 @@ class Paid:
         return costs.money(self.driven[1] - (self.common - self.saved.value))
 
     def share_words(self, costs: Costs) -> str:
-        """A year of the plan and of what it is held against: "235 EUR a year instead of 558 EUR
-        (common program), 57.8 % less".
+        """How much less a year of the plan takes than what it is held against: "57.8 % less than
+        the common program".
         """
-        before = sum(self.before_amounts(costs))
         word, gain = self.year(costs).money.gain()
         less = "less" if word == "saved" else "more"
-        then = yearly_money(sum(self._then(costs)), costs.currency)
         all_of_it = "with all of it " if self.has_reached is not None else ""
-        return (
-            f"{all_of_it}{then} a year instead of {yearly_money(before, costs.currency)} "
-            f"({self.before}), {percent_of(gain.value, before)} {less}"
-        )
+        share = percent_of(gain.value, sum(self.before_amounts(costs)))
+        return f"{all_of_it}{share} {less} than {_with_article(self.before)}"
+
+    def bills(self, costs: Costs) -> list[tuple[str, str]]:
+        """What a year costs, nights with it: of what the plan is held against, of what was driven,
+        and of the plan; empty where no saving is known.
+        """
+        if self.saved is None or self.common <= 0.0:
+            return []
+        before = self.before_amounts(costs)
+        found = [(self.before, sum(before))]
+        if self.driven is not None:
+            name, energy = self.driven
+            found.append((name.partition(",")[0], costs.money(energy) + before[1]))
+        found.append((planned_name(self.before), sum(self._then(costs))))
+        return [(name, f"{yearly_money(each, costs.currency)} a year") for name, each in found]
 
     def between_words(self, costs: Costs) -> str:
         """The interval of all that is saved; where a part of it was reached, whose it is."""
@@ -270,6 +281,11 @@ class Paid:
     def year(self, costs: Costs) -> SavedYear:
         """What is saved of a year in all; what isn't known counts as nothing."""
         return saved_year(self.saved or Amount(0.0, 0.0, 0.0), self.idle, costs)
+
+
+def _with_article(before: str) -> str:
+    """What a plan is held against, in a sentence: today's program has its own word before it."""
+    return before if before == TODAY else f"the {before}"
 
 
 def planned_name(before: str) -> str:

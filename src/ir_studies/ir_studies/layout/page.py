@@ -436,6 +436,14 @@ def _answer(
     ]
     sure = [each for each in sure if each]
     rests_on = counted_at(costs)
+    given_year = costs.money(like.mean() * costs.cycles_per_year(like.pace))
+    bills = [
+        (name, f"{yearly_money(each, costs.currency)} a year in shifts")
+        for name, each in (
+            ("as given", given_year),
+            ("placement 1", given_year - year.money.value),
+        )
+    ]
     if year.money.value <= 0.0 or year.money.low <= 0.0:
         result = "No placement is shown to save"
         do = "Leave everything where it stands."
@@ -448,13 +456,13 @@ def _answer(
             f"costs ({hour})."
         )
         result = f"Not worth moving: {price} a year"
-        return Answer(result, words, sure, do, between=between, counted=rests_on)
+        return Answer(result, words, sure, do, between=between, counted=rests_on, bills=bills)
     result = f"{price} less a year"
     do = (
         f"Move: that {payback(year.money, costs)}. Plan best_1.yaml, and look at cables, ways of "
         "people and how parts come, which no study knows."
     )
-    return Answer(result, words, sure, do, between=between, counted=rests_on)
+    return Answer(result, words, sure, do, between=between, counted=rests_on, bills=bills)
 
 
 def _verdict(finals: Sequence[Sequence[Final]], costs: Costs) -> tuple[str, bool]:
