@@ -129,6 +129,8 @@ def test_changes_add_up_to_what_is_saved_together(
     *parts, whole = (float(re.sub(r"\s", "", year)) for year in years)
     assert len(parts) > 2
     assert sum(parts) == pytest.approx(whole, abs=1e-9)
+    said = re.findall(r"at night and at weekends: ([\d.\s]+) EUR", page)
+    assert [float(re.sub(r"\s", "", each)) for each in said] == parts[:1]
 
 
 def test_an_interval_with_zero_in_it_says_so(compared: BeforeAfter, planner: Planner) -> None:

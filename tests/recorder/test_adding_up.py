@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -67,6 +68,8 @@ def test_groups_and_their_parts_add_up(groups: list[list[float]]) -> None:
     found = groups_adding_up(groups, "EUR")
     for whole, parts in found:
         assert sum(map(shown, parts)) == pytest.approx(shown(whole), abs=1e-6)
+    divided = groups_adding_up([[math.fsum(group)] for group in groups], "EUR")
+    assert [whole for whole, _ in divided] == [whole for whole, _ in found]
     total = yearly_money(math.fsum(part for group in groups for part in group), "EUR")
     if EUR.fullmatch(total):
         assert sum(shown(whole) for whole, _ in found) == pytest.approx(shown(total), abs=1e-6)
@@ -143,3 +146,29 @@ def test_tables_of_a_bill_add_up(analysis: Analysis, scattered: Scattered, seed:
         for value, note in re.findall(r"<b>([^<]*EUR)</b><small>([^<]*EUR outside)", year):
             assert sum(map(shown, note.split(","))) == pytest.approx(shown(value), abs=1e-9)
         assert "rounded by itself" not in made
+
+
+NIGHTS = re.compile(r"at night and at weekends: ([^(<]*) \(")
+
+
+@pytest.mark.sampled
+@pytest.mark.parametrize("seed", range(6))
+def test_what_nights_save_is_one_amount_on_a_page(
+    analysis: Analysis, scattered: Scattered, seed: int
+) -> None:
+    """In a list of steps, and in tables with a sum: as a part it was another by one."""
+    costs = Costs(price=float(np.random.default_rng(seed).uniform(0.05, 2.0)))
+    pair = [
+        (replace(each, recording=replace(each.recording, path=Path(f"{k}.mcap"))), ())
+        for k, each in enumerate(scattered(analysis, k) for k in range(2))
+    ]
+    page = plain(comparison_html(pair, costs=costs))
+    (said,) = NIGHTS.findall(page)
+    rows = rows_of(page, "For those who pay")
+    assert shown(said) == shown(rows["saved at night and at weekends, a year"][1])
+    fleet = plain(fleet_html(fleet_of(analysis, scattered), costs=costs))
+    (said,) = NIGHTS.findall(fleet)
+    row = rows_of(fleet, "Robots")["all"][3]
+    (part,) = re.findall(r"([\d\s.]+ EUR) at night", row)
+    measures = rows_of(fleet, "What could still be saved")
+    assert shown(said) == shown(part) == shown(measures["at night and at weekends"][1])

@@ -44,7 +44,6 @@ from ir_recorder.report.costs import (
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import checked, plant_of
 from ir_recorder.report.money_text import (
-    adding_up,
     money_of,
     span_of_money,
     yearly_money,
@@ -63,7 +62,7 @@ from ir_recorder.report.number_text import (
     watts,
 )
 from ir_recorder.report.page import PAGE_START, asset
-from ir_recorder.report.paid import a_night, counted_at, first_steps
+from ir_recorder.report.paid import a_night, counted_at, first_steps, saved_parts
 from ir_recorder.report.series import Curves, Json, packed, stretches
 from ir_recorder.report.shell import badge, shell
 from ir_recorder.report.tables import COMPACT, table
@@ -190,7 +189,10 @@ def _answer(analyses: Sequence[Analysis], names: Sequence[str], costs: Costs) ->
         do.append("In shifts: choose by time, peak or clearance (Runs in figures).")
     idle = recorded_idle_saving(analyses[0], costs)
     if idle is not None:
-        do += first_steps((), idle, costs)
+        saved = None if cycles[0] is None else costs.saving_of_year(cycles[0])
+        alone = saved is None or saved.value < 0.0
+        nights = "" if alone or saved is None else _plan_and_nights(saved, idle, costs)[1]
+        do += first_steps((), idle, costs, (nights, ()))
         sure.append(f"What nights save is {idle.basis}.")
         paid.append(f"what nights save {payback(idle.money, costs)}")
     words = "; ".join((words, *paid))
@@ -312,6 +314,13 @@ def _year(cycle: Production | None, first: Production | None, costs: Costs) -> s
     return f"{shown}<small>{percent(year / costs.energy_of_year(first).value - 1.0)}</small>"
 
 
+def _plan_and_nights(amount: Amount, idle: IdleSaving, costs: Costs) -> tuple[str, str]:
+    """What a plan and what rest saves of a year, as both add up."""
+    year = saved_year(amount, idle, costs).money
+    nights, plan = saved_parts([costs.money(amount.value)], idle, year, costs)
+    return (plan[0] if plan else ""), nights
+
+
 def _year_saved(cycle: Production | None, costs: Costs, shown: str) -> str:
     amount = costs.saving_of_year(cycle) if cycle is not None else None
     if cycle is None or cycle.savings is None or amount is None:
@@ -344,7 +353,7 @@ def _saved_rows(
     shown = [
         ("", "")
         if idle is None or amount is None or amount.value < 0.0
-        else adding_up((costs.money(amount.value), idle.saved), costs.currency)
+        else _plan_and_nights(amount, idle, costs)
         for idle, amount in zip(found, saved, strict=True)
     ]
     by_plan = [_year_saved(cycle, costs, own[0]) for cycle, own in zip(cycles, shown, strict=True)]

@@ -572,8 +572,9 @@ def _answer(paid: Paid, robots: Sequence[Robot], costs: Costs) -> Answer:
 def _steps(paid: Paid, robots: Sequence[Robot], costs: Costs) -> tuple[list[str], list[str]]:
     """What is to do, what saves most first; and what was done already."""
     found: list[tuple[float, str]] = []
+    left = _left_shown(robots, paid.idle, costs)
     if paid.idle is not None:
-        price = with_span(paid.idle.money, costs)
+        price = with_span(paid.idle.money, costs, left.get(_NIGHTS, ""))
         resting = at_night(paid.idle)
         several = sum(not robot.drives_only for robot in robots) > 1
         words = f"All together in {resting}" if several else f"{resting[0].upper()}{resting[1:]}"
@@ -589,7 +590,8 @@ def _steps(paid: Paid, robots: Sequence[Robot], costs: Costs) -> tuple[list[str]
         saved = sum_of(gains).of(costs.money)
         if saved.value <= 0.0:
             continue
-        words = f"{_plans(own)}: {with_span(saved, costs)} a year."
+        shown = "" if driven else left.get(_PLANS, "")
+        words = f"{_plans(own)}: {with_span(saved, costs, shown)} a year."
         if driven:
             done.append(words)
         else:
@@ -949,15 +951,33 @@ def _parts_left(
     open_plans = sum_of(plans).of(costs.money) if plans else None
     parts = []
     if idle is not None:
-        parts.append((idle.money, "at night"))
+        parts.append((idle.money, _NIGHTS))
     if open_plans is not None and open_plans.value > 0.0 and not open_plans.doubt:
-        parts.append((open_plans, "by its plan" if len(robots) == 1 else "by plans"))
+        parts.append((open_plans, "by its plan" if len(robots) == 1 else _PLANS))
     above = costs.money(sum(robot.above for robot in robots))
     if abs(above) >= NOTHING:
         parts.append(
             (Amount.of_value(above), "above its plan" if len(robots) == 1 else "above plans")
         )
     return parts
+
+
+_NIGHTS = "at night"
+_PLANS = "by plans"
+
+
+def _left_shown(robots: Sequence[Robot], idle: IdleSaving | None, costs: Costs) -> dict[str, str]:
+    """What is still to save of all robots, as the row of all has it: by its words."""
+    summed = [robot for robot in robots if not robot.drives_only]
+    parts = _parts_left(summed, idle, costs)
+    if not parts:
+        return {}
+    whole = sum_of([money for money, _ in parts])
+    values = adding_up([money.value for money, _ in parts], costs.currency, larger_end(whole))
+    found = {words: value for value, (_, words) in zip(values, parts, strict=True)}
+    if len(summed) == 1 and "by its plan" in found:
+        found[_PLANS] = found["by its plan"]
+    return found
 
 
 def _left(
@@ -1191,6 +1211,8 @@ def _potential(members: Sequence[Member], robots: Sequence[Robot], costs: Costs)
         for name, own in by_measure(members, costs).items()
     ]
     found += [*_night(members, robots, costs), *_of_plans(robots, costs)]
+    left = _left_shown(robots, _idle_saving(members, costs), costs)
+    as_part = {_NIGHT_ROW: left.get(_NIGHTS), _PLAN_ROW: left.get(_PLANS)}
     if not found:
         return '<p class="empty">No recording says it.</p>'
     found.sort(key=lambda measure: -measure[0])
@@ -1198,8 +1220,8 @@ def _potential(members: Sequence[Member], robots: Sequence[Robot], costs: Costs)
     rows = [
         (
             f"{name}{_most_at(own)}",
-            f"<b>{text(yearly_money(price, costs.currency))}</b>"
-            f"<small>{text(yearly_kilowatt_hours(sum(own.values())))}</small>",
+            f"<b>{text(as_part.get(name.partition('<')[0]) or yearly_money(price, costs.currency))}"
+            f"</b><small>{text(yearly_kilowatt_hours(sum(own.values())))}</small>",
             bar(price, most, "planned"),
         )
         for price, name, own in found
@@ -1216,6 +1238,8 @@ def _potential(members: Sequence[Member], robots: Sequence[Robot], costs: Costs)
     return f'{table(heads, rows, "What could still be saved", COMPACT)}<p class="hint">{hint}</p>'
 
 
+_NIGHT_ROW = "at night and at weekends"
+_PLAN_ROW = "plans that nobody drove"
 _MORE = 1.05  # times what the next one saves: else none saves most
 
 
@@ -1238,7 +1262,7 @@ def _night(
     energies = {name: idle.energy.value for name, idle in own.items() if idle is not None}
     ends = f"{yearly_span(nights.money.low, nights.money.high, costs.currency)} {costs.currency}"
     basis = f"{nights.mode} instead of closed brakes, {nights.basis}, 90 % interval {ends}"
-    name = f"at night and at weekends<small>{text(basis)}</small>"
+    name = f"{_NIGHT_ROW}<small>{text(basis)}</small>"
     return [(nights.saved, name, energies)]
 
 
@@ -1256,7 +1280,7 @@ def _of_plans(
         words += f", {between_of(plans.of(costs.money), costs)}" if plans.low < plans.high else ""
         if plans.value > 0.0 and not plans.doubt:
             energies = {name: saved.value for name, saved in undriven.items()}
-            name = f"plans that nobody drove<small>{text(words)}</small>"
+            name = f"{_PLAN_ROW}<small>{text(words)}</small>"
             found.append((costs.money(plans.value), name, energies))
     above = {robot.name: robot.above for robot in robots if robot.reached is not None}
     total = costs.money(sum(above.values()))

@@ -99,36 +99,46 @@ def adding_up(
 def groups_adding_up(
     groups: Sequence[Sequence[float]], currency: str, most: float = 0.0, *, yearly: bool = True
 ) -> list[tuple[str, list[str]]]:
-    """The same of groups of parts: the sum of each group, and its parts."""
+    """The same of groups of parts: the sum of each group, and its parts. Groups add up to the
+    total, parts to their group, so that a group is shown alike however it is divided.
+    """
     show = _yearly_digits if yearly else _digits
     parts = [part for group in groups for part in group]
     if not all(map(math.isfinite, parts)):
         return [(DASH, [DASH for _ in group]) for group in groups]
     total = math.fsum(parts)
     decimals = 0 if most >= NO_CENTS else len(show(total).partition(".")[2])
-    units = [part * 10.0**decimals for part in parts]
-    counts = [math.floor(unit) for unit in units]
-    missing = round(float(f"{total:.{decimals}f}") * 10.0**decimals) - sum(counts)
-    for k in sorted(range(len(units)), key=lambda k: counts[k] - units[k])[:missing]:
-        counts[k] += 1
+    unit = 10.0**decimals
+    sums = [math.fsum(group) * unit for group in groups]
+    wholes = _largest_remainder(sums, round(float(f"{total:.{decimals}f}") * unit))
     kind = "a" if yearly else "b"
+    sizes = [float(len(group)) for group in groups]
 
-    def shown(first: int, many: int) -> str:
-        value = sum(counts[first : first + many]) * 10.0**-decimals
-        words = f"{value:,.{decimals}f} {currency}".replace(",", " ")
-        place = float(_PLACES * first + many)
-        return _carried(kind, (*parts, most, place), words, currency)
+    def shown(count: int, place: int) -> str:
+        words = f"{count / unit:,.{decimals}f} {currency}".replace(",", " ")
+        carried = (*parts, most, *sizes, float(len(groups)), float(place))
+        return _carried(kind, carried, words, currency)
 
     found = []
-    first = 0
-    for group in groups:
-        own = [shown(first + k, 1) for k in range(len(group))]
-        found.append((shown(first, len(group)), own))
-        first += len(group)
+    for k, (group, sum_of) in enumerate(zip(groups, wholes, strict=True)):
+        counts = _largest_remainder([part * unit for part in group], sum_of)
+        own = [shown(count, _PLACES * k + j + 1) for j, count in enumerate(counts)]
+        found.append((shown(sum_of, _PLACES * k), own))
     return found
 
 
-_PLACES = 1000  # more than parts: where a group begins, times this, and how many parts it has
+def _largest_remainder(values: Sequence[float], total: int) -> list[int]:
+    """Whole numbers near values (N,) that add up to a total near their sum."""
+    counts = [math.floor(value) for value in values]
+    missing = total - sum(counts)
+    for k in sorted(range(len(values)), key=lambda k: counts[k] - values[k])[: max(missing, 0)]:
+        counts[k] += 1
+    for k in sorted(range(len(values)), key=lambda k: values[k] - counts[k])[: max(-missing, 0)]:
+        counts[k] -= 1
+    return counts
+
+
+_PLACES = 1000  # more than parts: of which group, times this, and which part of it, from 1; 0: all
 
 
 def larger_end(amount: Amount) -> float:

@@ -58,7 +58,7 @@ from ir_recorder.report.number_text import (
     watts,
 )
 from ir_recorder.report.page import PAGE_START, asset, filled, folded
-from ir_recorder.report.paid import MOVEMENTS, PAUSES, Paid, Tile, at_night, row_of
+from ir_recorder.report.paid import MOVEMENTS, PAUSES, Paid, Tile, at_night, row_of, saved_parts
 from ir_recorder.report.series import long_rests
 from ir_recorder.report.shell import badge
 from ir_recorder.report.step_table import TableValue, write_columns
@@ -335,8 +335,10 @@ def change_table(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     shown = [money_of(price, costs.currency) for price, _ in priced]
     summed = bool(priced) and whole_year.value > 0.0
     if summed:
-        parts = [*(price.value for price, _ in priced), rest]
-        shown = adding_up(parts, costs.currency, larger_end(whole_year))
+        plan = [*(price.value for price, _ in priced[idle is not None :]), rest]
+        nights, own = saved_parts(plan, idle, whole_year, costs)
+        alone = adding_up(plan, costs.currency, larger_end(whole_year))
+        shown = [nights, *own] if nights else alone
     rows = [
         (f"{k}. {where}", *cells, _price(price, costs, own), bar(price.value, most, "planned"))
         for k, ((price, (where, *cells)), own) in enumerate(
