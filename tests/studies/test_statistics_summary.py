@@ -245,7 +245,7 @@ def test_a_manager_reads_what_movements_cost(driven: bool) -> None:
     rows = pairs(0.1, 0.2, -0.1, 0.3)
     for row in rows:
         for side in SIDES:
-            scale = 36.0  # of 100 J: 3.6 kJ, so that 1 000 movements are 1 kWh
+            scale = 36.0  # of 100 J: 3.6 kJ, so that a million movements are 1 MWh
             figures = ("direct_j", "indirect_j", "predicted_j")
             row[side] |= {name: scale * row[side][name] for name in figures}
             if not driven:
@@ -260,10 +260,10 @@ def test_a_manager_reads_what_movements_cost(driven: bool) -> None:
         (each,) = (one for one in found.comparisons if one.name == "energy, predicted")
         meter = predicted = each.levels[1]
     for joules in {meter, predicted}:
-        words = f"{kilowatt_hours(1000.0 * joules)}, {money(costs.money(1000.0 * joules), 'EUR')}"
+        words = f"{kilowatt_hours(1e6 * joules)}, {money(costs.money(1e6 * joules), 'EUR')}"
         assert words in answer
     assert "at 0.2 EUR/kWh, assumed" in answer
     assert ("on the meter" in answer) == driven
-    assert "With asynchronous joints 1 000 take " in answer
+    assert "With asynchronous joints a million takes " in answer
     shown = any(one.shown for one in found.comparisons if one.name.startswith("energy"))
     assert ("which is not shown" in answer) != shown

@@ -399,7 +399,7 @@ def _answer(found: Findings) -> Answer | None:
     if not result:
         if found.solved == found.same:
             return None
-        return Answer(_timings(found), "", _SCOPE, "", _a_thousand(found))
+        return Answer(_timings(found), "", _SCOPE, "", _a_million(found))
     each = _against_direct(found)
     assert each is not None
     sure = [f"{counted(found.driven, 'movement')} between {counted(each.pairs, 'pair')} of places"]
@@ -417,7 +417,7 @@ def _answer(found: Findings) -> Answer | None:
         )
     if not any(one.shown for one in found.comparisons):
         advice.append("Take either timing: neither is shown to be better.")
-    costs = [*_a_thousand(found), *_in_money(each.mean)]
+    costs = [*_a_million(found), *_in_money(each.mean)]
     return Answer(result, f"{words} {_timings(found)}.", sure, advice, costs, between)
 
 
@@ -425,25 +425,25 @@ BOTH_ONCE = "by both timings, once where these move alike"
 """Which movements of a pair are driven."""
 
 
-def _a_thousand(found: Findings) -> list[str]:
-    """What a thousand movements take and cost, on the meter where it is known and as predicted, and
+def _a_million(found: Findings) -> list[str]:
+    """What a million movements take and cost, on the meter where it is known and as predicted, and
     what asynchronous joints change of it; none where no energy is known.
     """
     costs = Costs()
 
     def said(joules: float) -> str:
-        return f"{kilowatt_hours(1000.0 * joules)}, {money(costs.money(1000.0 * joules), 'EUR')}"
+        return f"{kilowatt_hours(1e6 * joules)}, {money(costs.money(1e6 * joules), 'EUR')}"
 
     price = f"at {price_of(costs.price, costs.currency)}, assumed"
     each = _against_direct(found)
     predicted = next((one for one in found.comparisons if one.name == PREDICTED), None)
     if each is not None:
         lines = [
-            f"1 000 such movements: {said(each.levels[1])} on the meter ({price}); predicted "
+            f"A million such movements: {said(each.levels[1])} on the meter ({price}); predicted "
             f"{said(each.levels[0])}."
         ]
     elif predicted is not None and math.isfinite(predicted.levels[1]):
-        lines = [f"1 000 such movements: {said(predicted.levels[1])} ({price}), predicted."]
+        lines = [f"A million such movements: {said(predicted.levels[1])} ({price}), predicted."]
     else:
         return []
     timed = next((one for one in found.comparisons if one.name == DIRECT and one.count), predicted)
@@ -451,7 +451,7 @@ def _a_thousand(found: Findings) -> list[str]:
         less = timed.levels[1] - timed.levels[0]
         kind = "less" if less >= 0.0 else "more"
         shown = "" if timed.shown else ", which is not shown"
-        lines.append(f"With asynchronous joints 1 000 take {said(abs(less))} {kind}{shown}.")
+        lines.append(f"With asynchronous joints a million takes {said(abs(less))} {kind}{shown}.")
     return lines
 
 
