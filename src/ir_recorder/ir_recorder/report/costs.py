@@ -727,14 +727,17 @@ def lever_section(analysis: Analysis, costs: Costs) -> str:
 # The robot around the clock: the largest quarter of an hour, rest outside of the shifts, payback.
 
 
-def clock_section(analysis: Analysis, costs: Costs) -> str:
-    """Section of the page; "" where no whole cycle is known."""
+def clock_section(analysis: Analysis, costs: Costs, nights: str = "") -> str:
+    """Section of the page; "" where no whole cycle is known. nights: what they save, as a part of
+    what is saved in all.
+    """
     cycle = production_of(analysis)
     if cycle is None:
         return ""
     return (
         '<section id="around"><h2>When nobody works</h2>'
-        f'{_idle(analysis, costs)}<p class="hint">{_demand(analysis, cycle, costs)}</p></section>'
+        f"{_idle(analysis, costs, nights)}"
+        f'<p class="hint">{_demand(analysis, cycle, costs)}</p></section>'
     )
 
 
@@ -917,13 +920,13 @@ def recorded_idle_saving(analysis: Analysis, costs: Costs) -> IdleSaving | None:
     return idle_saving(idle_watts(analysis), rest_saving(analysis), costs, measured=measured)
 
 
-def idle_sentence(found: IdleSaving | None, costs: Costs) -> str:
-    """The same in words; "" without it."""
+def idle_sentence(found: IdleSaving | None, costs: Costs, shown: str = "") -> str:
+    """The same in words; "" without it. shown: as a part of a sum."""
     if found is None:
         return ""
     return (
         f"Outside of shifts: {found.mode} instead of closing the brakes saves "
-        f"{yearly_money(found.saved, costs.currency)} a year, {found.basis}."
+        f"{shown or yearly_money(found.saved, costs.currency)} a year, {found.basis}."
     )
 
 
@@ -946,7 +949,7 @@ def how_to_hibernate(cell: Cell | None) -> str:
 _HIB = "HIB"
 
 
-def _idle(analysis: Analysis, costs: Costs) -> str:
+def _idle(analysis: Analysis, costs: Costs, nights: str) -> str:
     """What the robot draws while nobody works, by power mode."""
     found = idle_watts(analysis)
     if analysis.cell is not None and not analysis.cell.robot.controller.counted:
@@ -971,6 +974,6 @@ def _idle(analysis: Analysis, costs: Costs) -> str:
     return (
         f"{table(heads, rows, 'When nobody works', COMPACT)}"
         f'<p class="hint">{significant(costs.idle_hours, 6)} hours a year lie outside of the '
-        f"shifts, at machine home. {text(idle_sentence(saving, costs))} "
+        f"shifts, at machine home. {text(idle_sentence(saving, costs, nights))} "
         f"{text(how_to_hibernate(analysis.cell))}</p>"
     )

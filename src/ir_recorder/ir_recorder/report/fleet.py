@@ -1037,11 +1037,13 @@ def _around_the_clock(members: Sequence[Member], robots: Sequence[Robot], costs:
     if demands:
         rows.append(_clock_row("<b>all</b>", _sum_of_demands(demands), sums, costs))
     heads = ("robot", ">largest quarter of an hour", *(f">{_rest_head(mode)}" for mode in modes))
+    saves = _idle_saving(members, costs)
+    left = _left_shown(robots, saves, costs)
     hint = (
         f"{significant(costs.idle_hours, 6)} hours a year lie outside of the shifts; the columns "
         "of modes say what rest takes in them, by the data. The peak of all robots is the sum of "
         f"theirs: as if all came at once; it is on the basis of the bill ({_as_now(robots)}). "
-        f"{DEMAND_LEAVES_OUT} {idle_sentence(_idle_saving(members, costs), costs)}"
+        f"{DEMAND_LEAVES_OUT} {idle_sentence(saves, costs, left.get(_NIGHTS, ''))}"
     )
     return f'<p class="hint">{text(hint)}</p>{table(heads, rows, "Peak and rest")}'
 

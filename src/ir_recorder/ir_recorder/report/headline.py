@@ -65,6 +65,7 @@ from ir_recorder.report.paid import (
     counted_at,
     first_steps,
     reached_saving,
+    saved_parts,
 )
 
 _STYLES = {Verdict.HOLDS: "good", Verdict.FAILS: "bad", Verdict.NOT_CHECKED: "open"}
@@ -248,6 +249,18 @@ def answer(analysis: Analysis, costs: Costs) -> str:
     then = total.planned if analysis.program is None else cycle.energy
     part = (total.common * each, then * each)
     return paid.answer(costs, steps, part).html() + paid.picture(costs)
+
+
+def nights_as_part(analysis: Analysis, costs: Costs) -> str:
+    """What nights save, as the steps of a plan that was not driven have it; "" by itself."""
+    cycle = production_of(analysis)
+    if cycle is None or cycle.savings is None or analysis.program is not None:
+        return ""
+    paid = _paid(analysis, costs)
+    count = costs.cycles_per_year(cycle.pace)
+    parts = (cycle.savings.movements, cycle.savings.pauses)
+    plan = [costs.money(saved_amount(saving).value * count) for saving in parts]
+    return saved_parts(plan, paid.idle, paid.year(costs).money, costs)[0]
 
 
 def _without_saving(analysis: Analysis, cycle: Production, paid: Paid, costs: Costs) -> Answer:

@@ -109,8 +109,8 @@ class Paid:
             result = self.reached_words(costs)
         words = "; ".join(each for each in said if each)
         parts = saved_parts([money.value for money, _ in steps], self.idle, year.money, costs)
-        own = [f"{step}, predicted" for step in first_steps(steps, None, costs, ("", parts[1]))]
-        nights = first_steps(self._above_steps(costs), self.idle, costs, (parts[0], ()))
+        own = [f"{step}, predicted" for step in first_steps(steps, None, costs)]
+        nights = first_steps(self._above_steps(costs), self.idle, costs)
         return Answer(
             result,
             f"{words[0].upper()}{words[1:]}.",
