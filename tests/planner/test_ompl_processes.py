@@ -248,7 +248,7 @@ def test_at_the_end_of_the_work_the_process_is_asked_for_its_answer(
 
     thread = threading.Thread(target=answering, daemon=True)
     thread.start()
-    assert host._answered(ours, Work(10, 0.0, lambda: 0.0))
+    assert host._has_answered(ours, Work(10, 0.0, lambda: 0.0))
     thread.join(PATIENCE)
     assert said == [STOP]
 
@@ -257,9 +257,9 @@ def test_a_process_that_does_not_answer_at_the_end_is_waited_for_no_more(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     ours, _theirs = Pipe()
-    assert not host._answered(ours, ticking())
+    assert not host._has_answered(ours, ticking())
     monkeypatch.setattr(host, "_LAST_LOOKS", 3)
-    assert not host._answered(ours, Work(10, 0.0, lambda: 0.0))  # whose clock stands
+    assert not host._has_answered(ours, Work(10, 0.0, lambda: 0.0))  # whose clock stands
 
 
 ASKING = """

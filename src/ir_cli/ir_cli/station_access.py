@@ -230,7 +230,7 @@ def _judged(points: FloatArray, count: int, station: Station, scene: PlanningSce
     least = distance.min(axis=0, initial=np.inf)
     at_end = (distance[last] <= DEFAULT_SAFETY_DISTANCE).any(axis=0)
     mendable = whole and all(
-        least[z] > 0.0 and not at_end[z] and _by_hand(int(z), scene) for z in pairs
+        least[z] > 0.0 and not at_end[z] and _is_of_the_hand(int(z), scene) for z in pairs
     )
     contacts = tuple(_contact(int(z), float(least[z]), scene) for z in pairs if least[z] <= kept[z])
     within = tcp[(distance <= DEFAULT_SAFETY_DISTANCE).any(axis=1) & ~last]
@@ -238,7 +238,7 @@ def _judged(points: FloatArray, count: int, station: Station, scene: PlanningSce
     return AccessLine(points[0], float(out[-1]), whole, near, mendable, contacts, within)
 
 
-def _by_hand(z: int, scene: PlanningScene) -> bool:
+def _is_of_the_hand(z: int, scene: PlanningScene) -> bool:
     """Whether a pair is one of the hand, or of what it holds, with a body."""
     capsules = (*scene.cell.robot.capsules, *(c for load in scene.loads for c in load.capsules))
     hand = {capsule.name for capsule in capsules if capsule.link >= HAND + scene.cell.robot.base}

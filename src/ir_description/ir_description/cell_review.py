@@ -193,7 +193,7 @@ def _stations(cell: Cell) -> Iterator[CellFinding]:
             yield CellFinding(
                 "warning", station.name, f"its machine {machine.name} is switched off"
             )
-        if station.allowed_contacts and not _inside(machine.zone, point):
+        if station.allowed_contacts and not _is_inside(machine.zone, point):
             yield CellFinding(
                 "warning",
                 station.name,
@@ -219,7 +219,7 @@ def _reach(cell: Cell) -> float:
     return float(offsets.sum() + np.linalg.norm(cell.tcp[:3, 3]))
 
 
-def _inside(zone: Zone, point: FloatArray) -> bool:
+def _is_inside(zone: Zone, point: FloatArray) -> bool:
     local = zone.pose[:3, :3].T @ (point - zone.pose[:3, 3])
     return bool((np.abs(local) <= zone.size / 2.0).all())
 

@@ -59,11 +59,11 @@ class Store(Generic[T]):
                 self._bytes -= self._bytes_of(self._values.pop(key))
             self._values[key] = value
             self._bytes += self._bytes_of(value)
-            while len(self._values) > 1 and self._overfull():
+            while len(self._values) > 1 and self._is_overfull():
                 self._bytes -= self._bytes_of(self._values.popitem(last=False)[1])
         return key
 
-    def _overfull(self) -> bool:
+    def _is_overfull(self) -> bool:
         return len(self._values) > self._capacity or self._bytes > self._megabytes * 1_000_000
 
     def get(self, key: str) -> T:

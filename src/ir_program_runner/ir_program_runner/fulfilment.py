@@ -132,7 +132,7 @@ class Fulfilment:
     def _stop(self) -> bool:
         return self._ports.canceled() and not self._thrown
 
-    def _stopped(self) -> bool:
+    def _is_stopped(self) -> bool:
         """Whether the driver is stopped, or has been since the program was asked for."""
         driver = self._ports.driver
         return bool(driver.stop_latched) or driver.stops != self._after_stop
@@ -156,7 +156,7 @@ class Fulfilment:
         modes: tuple[PowerMode, ...] = ()
         if isinstance(request, ask.INTERRUPTIBLE) and self._stop():
             status = Status(StatusCode.PREEMPTED)
-        elif self._stopped() and _acts(request):
+        elif self._is_stopped() and _acts(request):
             status = self._stop_status()
         elif isinstance(request, ask.AskModes):
             status, modes = await ports.driver.query_modes()
@@ -209,14 +209,14 @@ class Fulfilment:
         def over() -> bool:
             return (
                 self._stop()
-                or self._stopped()
+                or self._is_stopped()
                 or ports.driver.silent
                 or bool(ports.fault())
                 or ports.driver.plant_time >= deadline
             )
 
         await ports.until(lambda: condition() or over())
-        if self._stopped():
+        if self._is_stopped():
             return self._stop_status()
         if condition():
             return Status.success()

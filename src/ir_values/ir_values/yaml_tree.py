@@ -193,20 +193,20 @@ def yaml_text(node: Node) -> str:
 
 def _lines(node: Node) -> Iterator[str]:
     content = node.content
-    if isinstance(content, dict) and not _small(node):
+    if isinstance(content, dict) and not _is_small(node):
         for key, entry in content.items():
-            if _small(entry.node):
+            if _is_small(entry.node):
                 yield f"{key}: {_flow(entry.node)}"
             else:
                 yield f"{key}:"
                 yield from (f"  {line}" for line in _lines(entry.node))
-    elif isinstance(content, list) and not _small(node):
+    elif isinstance(content, list) and not _is_small(node):
         yield from (f"- {_flow(entry)}" for entry in content)
     else:
         yield _flow(node)
 
 
-def _small(node: Node) -> bool:
+def _is_small(node: Node) -> bool:
     """Whether a value stands in one line: a figure, a word, a vector."""
     content = node.content
     if isinstance(content, dict):

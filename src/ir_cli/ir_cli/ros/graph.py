@@ -99,7 +99,7 @@ def type_of(
         typo = not own and graph.complete and bool(nearest(name, graph.known))
         if typo or graph.still > (DISCOVERY_SECONDS if seconds is None else seconds):
             starting = (
-                not typo and seconds is None and graph.still <= START_SECONDS and _starting(name)
+                not typo and seconds is None and graph.still <= START_SECONDS and _is_starting(name)
             )
             if not starting:
                 raise CommandError(_missing(name, kind, graph.known))
@@ -115,7 +115,7 @@ def settled(look: Callable[[], Mapping[str, str]]) -> dict[str, str]:
     return graph.known
 
 
-def _starting(name: str) -> bool:
+def _is_starting(name: str) -> bool:
     """Whether a process of this host has started, and watches, the nodes that have this name."""
     namespace = next((name.removesuffix(end) for end in _OF_NODES if name.endswith(end)), None)
     return namespace is not None and claimed(os.environ.get(DOMAIN, ""), namespace)
@@ -263,7 +263,7 @@ def run_send_goal(arguments: argparse.Namespace) -> int:
             name, goal, show if arguments.feedback else None, arguments.timeout
         )
     sys.stdout.write(message_to_yaml(result, limit))
-    return 0 if _succeeded(result) else 1
+    return 0 if _has_succeeded(result) else 1
 
 
 def run_cancel(arguments: argparse.Namespace) -> int:
@@ -279,7 +279,7 @@ def run_cancel(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _succeeded(result: Any) -> bool:
+def _has_succeeded(result: Any) -> bool:
     """By the status or the error code of the result, where it has one."""
     status = getattr(result, "status", None)
     if status is not None:

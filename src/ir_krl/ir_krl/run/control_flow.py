@@ -146,7 +146,7 @@ class Control:
             if error.place.line:
                 raise
             raise KrlRunError(error.reason, self.place(statement)) from None
-        self.continuing = self._beside or statement.data == "continue_"
+        self.continuing = self._is_beside or statement.data == "continue_"
 
     def _turns_back(
         self, between: Sequence[SyntaxTree], jump: Jump, turns: dict[str, _Turn]
@@ -158,7 +158,7 @@ class Control:
             turns[jump.label] = turn
         turn.count += 1
         still = turn.count > 1 and not self.memory.changed(turn.watched)
-        bound = not any(_ways_out(one) for one in between[:-1])
+        bound = not any(_has_way_out(one) for one in between[:-1])
         open_ = not jump.known and (bound or self._guessed_exits > turn.exits)
         if turn.count >= self.loop_passes and (still or open_):
             self._left(jump.place, f"GOTO {jump.label}", turn.count)
@@ -193,18 +193,18 @@ class Control:
         """
         if not self.continuing:
             self.memory.arrived()
-        if not self.continuing and self._rounding:
+        if not self.continuing and self._is_rounding:
             self.commands.append(AdvanceStop(why, place))
             if not assumed:
                 self.note_at(place, f"{why} stops the advance run: the motion before ends at rest")
 
     @property
-    def _beside(self) -> bool:
+    def _is_beside(self) -> bool:
         """Whether what runs is called by a TRIGGER: the robot goes on meanwhile."""
         return self.triggered is not None
 
     @property
-    def _rounding(self) -> bool:
+    def _is_rounding(self) -> bool:
         """Whether the last motion is to be left for a next one that didn't come yet."""
         for command in reversed(self.commands):
             if isinstance(command, Motion | SplineBlock):
@@ -220,8 +220,8 @@ class Control:
         """A condition, and whether it hangs on an assumed value or on nothing at all."""
         before = self.memory.guesses
         holds = self.expressions.truth(tree, what)
-        self.continuing = self._beside
-        return holds, self.memory.guesses > before or _constant(tree)
+        self.continuing = self._is_beside
+        return holds, self.memory.guesses > before or _is_constant(tree)
 
     def _if_(self, tree: SyntaxTree) -> None:
         condition, then, otherwise = tree.children
@@ -280,7 +280,7 @@ class Control:
 
     def _again(self, condition: SyntaxTree, body: SyntaxTree, *, wanted: bool) -> Again:
         """Asks whether a loop goes on, and whether that hangs on nothing that is known."""
-        exits = _constant(condition) and _leaves(body)
+        exits = _is_constant(condition) and _leaves(body)
 
         def asked() -> tuple[bool, bool | None]:
             holds, open_ = self._decided(condition, "the condition of a loop")
@@ -305,7 +305,7 @@ class Control:
             return
         self._left(self.place(tree), word, passes)
         if not _leaves(body) and all(
-            _constant(one)
+            _is_constant(one)
             for one in tree.children
             if one is not body and isinstance(one, SyntaxTree)
         ):
@@ -351,7 +351,7 @@ class Control:
         subject, *cases, default = tree.children
         before = self.memory.guesses
         value = self.memory.guess(self.expressions.value(subject), 0, self.place(tree))
-        self.continuing = self._beside
+        self.continuing = self._is_beside
         open_ = self.memory.guesses > before
         self._count_exits(tree, open_=open_)
         for case in cases:
@@ -423,7 +423,7 @@ class Control:
             text = "WAIT FOR after CONTINUE: taken as fulfilled when it is reached"
             self.note_at(place, text, Effect.TIMES)
             return
-        if self._blocked(condition, wanted=True):
+        if self._is_blocked(condition, wanted=True):
             text = "this wait never ends by what the program itself sets: taken as ended"
             self.note_at(place, text, Effect.MOTIONS)
             self._settle(condition, wanted=True)
@@ -441,20 +441,20 @@ class Control:
         self.commands.append(WaitForCondition(_written(condition), place))
         self._signals.moved()
 
-    def _blocked(self, tree: SyntaxTree, *, wanted: bool) -> bool:
+    def _is_blocked(self, tree: SyntaxTree, *, wanted: bool) -> bool:
         """Whether flags and variables, which only the program sets, keep a condition from what a
         wait wants of it; inputs and the state of the controller may come to it.
         """
         match tree.data:
             case "negated":
-                return self._blocked(tree.children[1], wanted=not wanted)
+                return self._is_blocked(tree.children[1], wanted=not wanted)
             case "joined" if str(tree.children[1]) in ("AND", "OR"):
-                sides = [self._blocked(one, wanted=wanted) for one in tree.children[::2]]
+                sides = [self._is_blocked(one, wanted=wanted) for one in tree.children[::2]]
                 every = (str(tree.children[1]) == "AND") is wanted
                 return any(sides) if every else all(sides)
             case "compared" if _is_truth_comparison(tree):
                 same = _holds_with_left(tree)
-                return self._blocked(tree.children[0], wanted=wanted is same)
+                return self._is_blocked(tree.children[0], wanted=wanted is same)
         if not self._is_own(tree):
             return False
         before = self.memory.guesses
@@ -493,7 +493,7 @@ class Control:
         bound = 0.0
         if condition.data == "compared" and str(condition.children[1]) in (">", ">="):
             given = condition.children[2]
-            if not _constant(given):
+            if not _is_constant(given):
                 return None
             bound = self.expressions.number(given, "the bound of a timer")
             condition = condition.children[0]
@@ -632,18 +632,18 @@ def _label_in(body: SyntaxTree, name: str) -> int | None:
     return next((k for k in labels if str(body.children[k].children[0]) == name), None)
 
 
-def _constant(tree: SyntaxTree) -> bool:
+def _is_constant(tree: SyntaxTree) -> bool:
     """Whether an expression names nothing: WHILE TRUE, WHILE 1==1."""
     if tree.data in ("access", "call"):
         return False
-    return all(_constant(one) for one in tree.children if isinstance(one, SyntaxTree))
+    return all(_is_constant(one) for one in tree.children if isinstance(one, SyntaxTree))
 
 
-def _ways_out(tree: SyntaxTree) -> bool:
+def _has_way_out(tree: SyntaxTree) -> bool:
     """Whether a jump, a return or an exit stands in a statement."""
     if tree.data in ("goto", "return_", "exit"):
         return True
-    return any(_ways_out(one) for one in tree.children if isinstance(one, SyntaxTree))
+    return any(_has_way_out(one) for one in tree.children if isinstance(one, SyntaxTree))
 
 
 def _leaves(body: SyntaxTree) -> bool:
@@ -653,14 +653,14 @@ def _leaves(body: SyntaxTree) -> bool:
     inner = ("loop", "for_", "while_", "repeat")
     return any(
         child.data in ("exit", "goto", "return_")
-        or (_leaves(child) if child.data not in inner else _ways_far(child))
+        or (_leaves(child) if child.data not in inner else _has_way_far_out(child))
         for child in body.children
         if isinstance(child, SyntaxTree)
     )
 
 
-def _ways_far(tree: SyntaxTree) -> bool:
+def _has_way_far_out(tree: SyntaxTree) -> bool:
     """Whether a jump or a return stands in a statement: an EXIT leaves the loop inside alone."""
     if tree.data in ("goto", "return_"):
         return True
-    return any(_ways_far(one) for one in tree.children if isinstance(one, SyntaxTree))
+    return any(_has_way_far_out(one) for one in tree.children if isinstance(one, SyntaxTree))

@@ -496,7 +496,7 @@ class Signals:
         if name in (INPUT, OUTPUT):
             self.stops(place, f"{name}[{index}]")
         if name == INPUT:
-            return self._input(index, place)
+            return self._is_input(index, place)
         if name == TIMER_FLAG:
             self.stands_still(index, place)
             return number(self._held(TIMER, index) or 0, f"$TIMER[{index}]", place) > 0.0
@@ -525,7 +525,7 @@ class Signals:
         text = f"$TIMER[{index}] stands still: no time passes for a timer"
         self.noted(place, text, Effect.MOTIONS)
 
-    def _input(self, index: int, place: SourcePlace) -> bool:
+    def _is_input(self, index: int, place: SourcePlace) -> bool:
         if index in self.inputs:
             return self.inputs[index]
         if index in self.expected:

@@ -97,7 +97,7 @@ class Assigning(Control):
             return
         self._check_effect(name, value, where)
         self.memory.set(path, value, where)
-        if self._beside and not name.startswith("$"):
+        if self._is_beside and not name.startswith("$"):
             self.memory.set_beside(name)
         if index is not None:
             self._follow_clock(name, index[0], value)
@@ -125,14 +125,14 @@ class Assigning(Control):
         """Whether a cyclical flag is evaluated anew from its assignment on: of signals alone."""
         self._flags.pop(index, None)
         self._signals.cyclic.pop(index, None)
-        if not self._of_signals(expression):
+        if not self._is_of_signals(expression):
             return False
         self._flags[index] = expression
         anew = partial(self.expressions.truth, expression, f"{CYCLIC}[{index}]")
         self._signals.cyclic[index] = anew
         return True
 
-    def _of_signals(self, tree: SyntaxTree) -> bool:
+    def _is_of_signals(self, tree: SyntaxTree) -> bool:
         """Whether an expression hangs on inputs and outputs, and on nothing else."""
         if tree.data == "access":
             name = str(tree.children[0])
@@ -145,7 +145,7 @@ class Assigning(Control):
         if tree.data == "call":
             return False
         return tree.data not in ("true", "false") and all(
-            self._of_signals(one) for one in tree.children if isinstance(one, SyntaxTree)
+            self._is_of_signals(one) for one in tree.children if isinstance(one, SyntaxTree)
         )
 
     def _check_effect(self, name: str, value: Value, where: SourcePlace) -> None:
@@ -182,7 +182,7 @@ class Assigning(Control):
         switch = self.triggered
         if not on_path and switch is None:
             self.memory.arrived()
-        if on_path and switch is None and self._rounding:
+        if on_path and switch is None and self._is_rounding:
             switch = END_OF_LAST
             if not in_time:
                 text = (
@@ -326,7 +326,7 @@ class Motions:
                 base,
                 tool,
                 name,
-                self._external_tool,
+                self._has_external_tool,
                 place_of_rail,
             )
 
@@ -390,10 +390,12 @@ class Motions:
             axis = None
             frame = dict.fromkeys(FRAME_NAMES[:3], 0.0)
         base, tool = self.frames(place)
-        return Target(axis, frame, None, None, True, False, base, tool, name, self._external_tool)
+        return Target(
+            axis, frame, None, None, True, False, base, tool, name, self._has_external_tool
+        )
 
     @property
-    def _external_tool(self) -> bool:
+    def _has_external_tool(self) -> bool:
         return self._memory.peek("$IPO_MODE") == Symbol("TCP")
 
     def frames(self, place: SourcePlace) -> tuple[FloatArray, FloatArray]:
@@ -650,10 +652,10 @@ class Moving(Assigning):
 
     def _not_beside(self, tree: SyntaxTree) -> bool:
         """Whether a motion stands in what a TRIGGER calls: a controller doesn't take it there."""
-        if self._beside:
+        if self._is_beside:
             text = "a motion in what a TRIGGER calls: a controller refuses it, it isn't driven"
             self.note(tree, text, Effect.MOTIONS)
-        return self._beside
+        return self._is_beside
 
     def _in_advance(self, built: _Built) -> _Built:
         """A motion as far as it is known in advance: $ADVANCE=0 rounds no corner."""

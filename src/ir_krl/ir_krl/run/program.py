@@ -532,6 +532,6 @@ class _Run(Moving):
     _resume = _interrupt_switched
 
     def _brake(self, tree: SyntaxTree) -> None:
-        if self._beside:
+        if self._is_beside:
             text = "BRAKE in what a TRIGGER calls stops the robot: not followed"
             self.note(tree, text, Effect.MOTIONS)

@@ -85,8 +85,8 @@ def tool_numbers(
         load = payload_of(carried.get(number), SourcePlace())
         if _is_null(tools.get(number)) and (load is None or load.mass <= 0.0):
             return "free"
-        same = load is not None and _same_load(load, loads[name])
-        return "plant" if same and _same_frame(tools.get(number), tool) else None
+        same = load is not None and _is_same_load(load, loads[name])
+        return "plant" if same and _is_same_frame(tools.get(number), tool) else None
 
     return _numbered(
         "tool", list(loads), asked.tools, TOOL_HIGHEST, origin if asked.plant else None
@@ -98,7 +98,7 @@ def base_numbers(asked: FrameNumbers, bases: Mapping[str, FloatArray]) -> tuple[
     there = _plant(asked, "BASE_DATA")
 
     def origin(name: str, number: int) -> Origin | None:
-        if _same_frame(there.get(number), bases[name]):
+        if _is_same_frame(there.get(number), bases[name]):
             return "plant"
         return "free" if _is_null(there.get(number)) else None
 
@@ -156,17 +156,17 @@ def _plant(asked: FrameNumbers, name: str) -> dict[int, Value]:
 
 def _is_null(value: Value | None) -> bool:
     """Whether nothing stands at a number: no frame, or one of zeros."""
-    return not isinstance(value, Structure) or _same_frame(value, np.eye(4))
+    return not isinstance(value, Structure) or _is_same_frame(value, np.eye(4))
 
 
-def _same_frame(value: Value | None, frame: FloatArray) -> bool:
+def _is_same_frame(value: Value | None, frame: FloatArray) -> bool:
     if not isinstance(value, Structure):
         return False
     apart = np.abs(pose(value, "the plant's frame", SourcePlace()) - frame)
     return bool(apart[:3, 3].max() <= _SAME_PLACE and apart[:3, :3].max() <= _SAME_TURN)
 
 
-def _same_load(a: Payload, b: Payload) -> bool:
+def _is_same_load(a: Payload, b: Payload) -> bool:
     mass, place, inertia = _SAME_LOAD
     return (
         abs(a.mass - b.mass) <= mass

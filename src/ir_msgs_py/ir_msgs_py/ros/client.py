@@ -182,7 +182,7 @@ class GoalSender:
             raise RequestRefusedError(f"{action} rejected the goal", int(StatusCode.FAILURE))
         result: Future = self._executor.run(handle.get_result_async)
         try:
-            if self._ended(action, client, handle, result, result_timeout, give_up):
+            if self._has_ended(action, client, handle, result, result_timeout, give_up):
                 # feedback that came with the result is called back after it
                 self._executor.run(_nothing)
                 return result.result().result
@@ -205,7 +205,7 @@ class GoalSender:
             client.destroy()
         self._clients.clear()
 
-    def _ended(
+    def _has_ended(
         self,
         action: str,
         client: ActionClient,

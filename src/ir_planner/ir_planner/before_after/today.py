@@ -325,7 +325,9 @@ def _loads(steps: Sequence[DrivenStep]) -> tuple[tuple[Load, ...], list[str]]:
     carried = []
     for step in steps:
         load = whole_load(step.scene.loads, step.places[0])
-        same = next((load_before for load_before in loads if _same_load(load_before, load)), None)
+        same = next(
+            (load_before for load_before in loads if _is_same_load(load_before, load)), None
+        )
         if same is None:
             name = LOAD_NAME if not loads else f"{LOAD_NAME}_{len(loads) + 1}"
             same = replace(load, name=name)
@@ -334,7 +336,7 @@ def _loads(steps: Sequence[DrivenStep]) -> tuple[tuple[Load, ...], list[str]]:
     return tuple(loads), carried
 
 
-def _same_load(a: Load, b: Load) -> bool:
+def _is_same_load(a: Load, b: Load) -> bool:
     names = [[capsule.name for capsule in load.capsules] for load in (a, b)]
     figures = [np.concatenate([[load.mass], load.com, load.inertia.ravel()]) for load in (a, b)]
     return names[0] == names[1] and np.array_equal(figures[0], figures[1])

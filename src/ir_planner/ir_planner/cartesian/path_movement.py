@@ -189,7 +189,7 @@ def _driven_with(
     for chain in found:
         if len(driven) == COMPARED or (driven and asked.context.work.exhausted):
             break
-        if not _worth(chain, driven, asked.context.options.objective):
+        if not _is_worth_driving(chain, driven, asked.context.options.objective):
             continue
         try:
             driven.append(timed(asked, chain, longer=longer))
@@ -200,7 +200,7 @@ def _driven_with(
     return driven, reasons
 
 
-def _worth(chain: ConfigurationChain, driven: list[DrivenPath], objective: str) -> bool:
+def _is_worth_driving(chain: ConfigurationChain, driven: list[DrivenPath], objective: str) -> bool:
     """Whether a chain may be cheaper than those that are driven. One of the same joules is their
     mirror image with the wrist turned over; where joules decide, those that cost far more lose.
     """

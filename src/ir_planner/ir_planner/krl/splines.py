@@ -432,7 +432,7 @@ def tool_motion(motion: Motion, start: FloatArray, arm: Arm) -> ToolMotion | Non
     poses[:, :3, :3] = turned_evenly(first[:3, :3], last[:3, :3], share)
     turning = float(turn_of(portable.matmul(first[:3, :3].T, last[:3, :3])))
     speed = _speed(motion.speeds, path.length, turning)
-    if path.length < _SHORTEST or not _described(motion.target, turning, speed, arm):
+    if path.length < _SHORTEST or not _is_described(motion.target, turning, speed, arm):
         return None
     tcp = _in_cell(poses, motion.target, arm)
     if isinstance(path, Line):
@@ -452,7 +452,7 @@ def tool_spline(block: SplineBlock, start: FloatArray, arm: Arm) -> ToolMotion |
     turns = portable.matmul(poses[:-1, :3, :3].transpose(0, 2, 1), poses[1:, :3, :3])
     turning = float(turn_of(turns).sum())
     speed = _speed(first.speeds, length, turning)
-    if len(poses) > POSES_MAX or not _described(first.target, turning, speed, arm):
+    if len(poses) > POSES_MAX or not _is_described(first.target, turning, speed, arm):
         return None
     tcp = _in_cell(poses, first.target, arm)
     segment = CartesianSegment(SPLINE, tuple(tcp[1:]), speed)
@@ -464,7 +464,7 @@ def _in_cell(poses: FloatArray, target: Target, arm: Arm) -> FloatArray:
     return arm.tcp(target.flange(poses))
 
 
-def _described(target: Target, turning: float, speed: float, arm: Arm) -> bool:
+def _is_described(target: Target, turning: float, speed: float, arm: Arm) -> bool:
     """Whether the cell's tcp draws what the program's tool does, at a speed that a path may
     have.
     """

@@ -392,7 +392,7 @@ def path_of(request: Any, cell: Cell) -> CartesianPath | CellPath:
         )
     if request.path:
         own = cell.own_path(request.path)
-        changed = {name: getattr(request, name) for name in _FIELDS if _changed(request, name)}
+        changed = {name: getattr(request, name) for name in _FIELDS if _has_changed(request, name)}
         return replace(own, path=replace(own.path, **changed))
     foot = foot_frame(cell)
     start = stamped_pose_from_msg(request.start_pose, {foot: cell.base_pose})
@@ -404,7 +404,7 @@ def path_of(request: Any, cell: Cell) -> CartesianPath | CellPath:
     return CartesianPath(start, segments, **{name: getattr(request, name) for name in _FIELDS})
 
 
-def _changed(request: Any, name: str) -> bool:
+def _has_changed(request: Any, name: str) -> bool:
     return bool(getattr(request, name) != CartesianPath.__dataclass_fields__[name].default)
 
 

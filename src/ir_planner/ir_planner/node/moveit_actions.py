@@ -177,13 +177,13 @@ class AcceptedGoals:
         one = self._goals.pop(bytes(goal.goal_id.uuid))
         if code == StatusCode.SUCCESS:
             goal.succeed()
-        elif one.by_client and _canceling(goal):
+        elif one.by_client and _is_canceling(goal):
             goal.canceled()
         else:
             goal.abort()
 
 
-def _canceling(goal: Any) -> bool:
+def _is_canceling(goal: Any) -> bool:
     """Whether rclpy lets a goal end as canceled: it says so just after the cancel's callback, and
     never where that failed.
     """

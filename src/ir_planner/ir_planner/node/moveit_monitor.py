@@ -118,7 +118,7 @@ class SceneMonitor:
         if came:
             self._publish_whole(cell)
         q = self._where(cell.robot.joint_names)
-        if q is None or (self._told is not None and _near(q, self._told)):
+        if q is None or (self._told is not None and _is_near(q, self._told)):
             return
         self._told = q
         diff = self._msgs.PlanningScene(
@@ -145,5 +145,5 @@ class SceneMonitor:
             self._node.get_logger().warning(f"{EVENT} {message.data[:40]!a}: only {STOP} is known")
 
 
-def _near(a: FloatArray, b: FloatArray) -> bool:
+def _is_near(a: FloatArray, b: FloatArray) -> bool:
     return a.shape == b.shape and bool(np.abs(a - b).max() < _MOVED)

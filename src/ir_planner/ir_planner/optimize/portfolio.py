@@ -141,7 +141,9 @@ class Portfolio:
 
     def _take(self, candidate: Candidate) -> bool:
         """Keep a candidate unless one that is alike costs no more."""
-        alike = [other for other in self.candidates if _alike(other.solution, candidate.solution)]
+        alike = [
+            other for other in self.candidates if _are_alike(other.solution, candidate.solution)
+        ]
         if any(candidate.solution.cost >= _BETTER * other.solution.cost for other in alike):
             return False
         self.candidates = [c for c in self.candidates if c not in alike or c.refined]
@@ -269,6 +271,6 @@ class Portfolio:
         return best
 
 
-def _alike(a: Solution, b: Solution) -> bool:
+def _are_alike(a: Solution, b: Solution) -> bool:
     """Whether two coarse solutions pass the same configurations."""
     return apart(a.places, b.places) < COARSE

@@ -172,7 +172,7 @@ class Blending:
             stops += [before.hop] if after.kind == ENTER else []
         else:
             stops = list(range(before.hop, after.hop))
-            if not all(self._passable(stop) for stop in stops):
+            if not all(self._is_passable(stop) for stop in stops):
                 return None
         blend = min(blend_at(route, stop, asked) for stop in stops)
         if blend <= 0.0:
@@ -183,7 +183,7 @@ class Blending:
             return PassedPlace(f"outer end at {name}", "", q, blend)
         return PassedPlace(name, name, q, blend)
 
-    def _passable(self, stop: int) -> bool:
+    def _is_passable(self, stop: int) -> bool:
         """Whether nothing happens at a stop, and before the next movement."""
         route = self.route
         if stop + 1 >= len(route) or route.stops[stop] + 1 != route.stops[stop + 1]:
@@ -271,8 +271,8 @@ class Blending:
             if found is None:
                 return None
             both, window = found
-            kept = _passes(window, [place], context) and _free(window, context)
-            return both if kept and (not driveable or _driveable(window, context)) else None
+            kept = _passes(window, [place], context) and _is_free(window, context)
+            return both if kept and (not driveable or _is_driveable(window, context)) else None
 
         for driveable in (True, False):
             by, longest = _longest(partial(overlap, driveable=driveable), most)
@@ -360,14 +360,14 @@ def _passes(trajectory: JointTrajectory, places: Sequence[PassedPlace], context:
     return passed_within(trajectory, q, near, context.scene) is not None
 
 
-def _free(trajectory: JointTrajectory, context: Context) -> bool:
+def _is_free(trajectory: JointTrajectory, context: Context) -> bool:
     """Whether a part of a movement keeps the distances and the tilt that the movement has to."""
     margin = context.safety_distance
     near = clearance_violation(trajectory, context.scene, margin, context.station)
     return near is None and tilt_violation(trajectory, context.cone) is None
 
 
-def _driveable(trajectory: JointTrajectory, context: Context) -> bool:
+def _is_driveable(trajectory: JointTrajectory, context: Context) -> bool:
     """Whether a part of a movement keeps all limits."""
     scene = context.scene
     torque = torque_proof(trajectory, scene, 1.0 - scene.drives.torque_reserve)

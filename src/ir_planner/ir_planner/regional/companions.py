@@ -228,7 +228,7 @@ def not_worse_than_baseline(
         straight = [path for path in straight if np.array_equal(path[-1], reached)] or straight
     for path in straight[:1]:
         with context.journal.stage("baseline") as notes:
-            if best is not None and _excluded(path, best[1], context):
+            if best is not None and _is_excluded(path, best[1], context):
                 notes.append("costs more even where torque is no limit")
                 continue
             better = [
@@ -244,7 +244,7 @@ def not_worse_than_baseline(
     return best
 
 
-def _excluded(segment: FloatArray, best: Movement, context: Context) -> bool:
+def _is_excluded(segment: FloatArray, best: Movement, context: Context) -> bool:
     """Whether a bound says that the baseline along a segment (2, n) costs more than the best
     movement.
     """
@@ -348,12 +348,12 @@ def with_own_laws(synchronous: Movement, context: Context) -> Movement:
     planning_time is over.
     """
     with context.journal.stage("asynchronous") as notes:
-        if _too_late(context):
+        if _is_too_late(context):
             notes.append(LATE)
             return synchronous
         asynchronous = _own(synchronous, context)
         if asynchronous is None or not (
-            _as_named(context) or asynchronous.cost <= synchronous.cost
+            _is_asked_by_name(context) or asynchronous.cost <= synchronous.cost
         ):
             notes.append(SYNCHRONOUS)
             return synchronous
@@ -362,12 +362,12 @@ def with_own_laws(synchronous: Movement, context: Context) -> Movement:
         return asynchronous
 
 
-def _too_late(context: Context) -> bool:
+def _is_too_late(context: Context) -> bool:
     """Whether planning_time is over, with an answer at hand."""
-    return not _as_named(context) and context.work.exhausted and context.work.truncated
+    return not _is_asked_by_name(context) and context.work.exhausted and context.work.truncated
 
 
-def _as_named(context: Context) -> bool:
+def _is_asked_by_name(context: Context) -> bool:
     """Whether asynchronous joints are asked for at any cost: a PTP by name, unless the fastest."""
     return context.options.planner_id == DIRECT and context.options.objective != "time"
 

@@ -247,13 +247,15 @@ def enclosure(ends: Ends, space: FreeSpace) -> EndEnclosure | None:
             field.cube(portable.matmul(pose[:3, :3], ball.point) + pose[:3, 3])
             for pose in links[:, ball.link]
         ]
-        if _joined(field, ball.radius, farthest, cubes):
+        if _is_joined(field, ball.radius, farthest, cubes):
             continue
         low = 0.0
         high = ball.radius
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            low, high = (middle, high) if _joined(field, middle, farthest, cubes) else (low, middle)
+            low, high = (
+                (middle, high) if _is_joined(field, middle, farthest, cubes) else (low, middle)
+            )
         part = field.components(high, farthest)
         start, goal = (part == part[cube] for cube in cubes[:2])
         end, inside = ("goal", goal) if goal.sum() <= start.sum() else ("start", start)
@@ -265,7 +267,7 @@ def enclosure(ends: Ends, space: FreeSpace) -> EndEnclosure | None:
     return None
 
 
-def _joined(field: BallField, needed: float, farthest: float, cubes: list[Index]) -> bool:
+def _is_joined(field: BallField, needed: float, farthest: float, cubes: list[Index]) -> bool:
     """Whether the first cube and any other are in one component."""
     part = field.components(needed, farthest)
     return any(part[cube] == part[cubes[0]] for cube in cubes[1:])

@@ -140,11 +140,11 @@ def hand_over_cells(arms: tuple[ArmProgram, ArmProgram], robots: tuple[int, int]
     for giver, taker in ((0, 1), (1, 0)):
         for part, station, left, taken in _hand_overs(arms[giver], arms[taker]):
             lying = _lying(arms[giver], part, station)
-            before = [k for k in range(left + 1) if k == left or _near(arms[giver], k, lying)]
+            before = [k for k in range(left + 1) if k == left or _is_near(arms[giver], k, lying)]
             after = [
                 k
                 for k in range(taken, len(arms[taker].steps))
-                if k == taken or _near(arms[taker], k, lying)
+                if k == taken or _is_near(arms[taker], k, lying)
             ]
             pairs = [(k, taken) for k in before] + [(left, k) for k in after]
             for gives, takes in pairs:
@@ -221,7 +221,7 @@ def check_lying_parts(arms: Sequence[ArmProgram]) -> None:
             brought = any(_leaves(arm, part, station) for arm in arms)
             for other in arms:
                 for k in _unaware(other, part, station, brought or other is not owner):
-                    if _near(other, k, lying):
+                    if _is_near(other, k, lying):
                         raise RequestError(
                             StatusCode.INVALID_GOAL_CONSTRAINTS,
                             f"{other.robot} comes too near to {part}, which {owner.robot} has at "
@@ -252,6 +252,6 @@ def _places(arm: ArmProgram) -> list[tuple[str, str]]:
     return sorted({each for each in handled if each[0]})
 
 
-def _near(arm: ArmProgram, k: int, equipment: Equipment) -> bool:
+def _is_near(arm: ArmProgram, k: int, equipment: Equipment) -> bool:
     """Whether any of the movements of a column comes too near."""
     return any(arm.too_near(one, equipment) for one in arm.columns[k].movements)

@@ -282,9 +282,11 @@ class _Sbl:
                 return None
             level[k] += 1
             self._note(owners[k], bridge, int(level[k]))
-        return q if self._proved(q, level, owners, bridge) else None
+        return q if self._is_proved(q, level, owners, bridge) else None
 
-    def _proved(self, q: FloatArray, level: FloatArray, owners: list[int], bridge: _Bridge) -> bool:
+    def _is_proved(
+        self, q: FloatArray, level: FloatArray, owners: list[int], bridge: _Bridge
+    ) -> bool:
         """Whether every edge of the path q (M, n) is certified; the first that isn't is taken
         out.
         """

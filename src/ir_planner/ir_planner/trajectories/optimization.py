@@ -220,7 +220,7 @@ class _Optimization:
             return self._answer(blocked)
         if np.abs(goal - start).max() < STILL:
             return self._standing()
-        candidates = [self.original] if self._within_options(self.original) else []
+        candidates = [self.original] if self._is_within_options(self.original) else []
         found = self._optimised()
         if found is None and not self._fits(candidates):
             status, found = self._rerouted()
@@ -296,7 +296,7 @@ class _Optimization:
         self.journal.note("result", "not the original's path but a new one between its end points")
         return status, movement
 
-    def _within_options(self, movement: Movement) -> bool:
+    def _is_within_options(self, movement: Movement) -> bool:
         """Whether a movement is certified and within the scalings."""
         options = self.options
         report = movement.report

@@ -89,7 +89,7 @@ def _plateau(
     payload = float(sum(item.mass for item in loads)) if known else NAN
     expected = resting_watts(mode, cell.robot.machine_home, cell, loads, data) if known else NAN
     of_the_paper = (
-        known and cell.robot.name == data.table_2_robot and _of_the_paper(loads, payload, data)
+        known and cell.robot.name == data.table_2_robot and _is_of_the_paper(loads, payload, data)
     )
     table_2 = data.measured(round(payload), mode) if of_the_paper else NAN
     modelled = known and mode == MOTORS and data.measured_rest(mode) is None
@@ -106,7 +106,7 @@ def _interval(
     return expected + low - watts, expected + high - watts
 
 
-def _of_the_paper(loads: tuple[Load, ...], payload: float, data: PowerData) -> bool:
+def _is_of_the_paper(loads: tuple[Load, ...], payload: float, data: PowerData) -> bool:
     """Whether Table II was measured with this load: its mass, and the watts that its rows
     contain.
     """

@@ -65,7 +65,7 @@ def check_grid(joints: JointSeries, power: PowerSeries | None) -> GridCheck:
         if k == len(steps):
             break
         part_start = k + 1
-        if power is not None and _asleep(power, joints.time[k], joints.time[k + 1]):
+        if power is not None and _is_asleep(power, joints.time[k], joints.time[k + 1]):
             excused += 1
             origin = int(joints.stamp_ns[k + 1])
         else:
@@ -75,7 +75,7 @@ def check_grid(joints: JointSeries, power: PowerSeries | None) -> GridCheck:
     )
 
 
-def _asleep(power: PowerSeries, start: float, end: float) -> bool:
+def _is_asleep(power: PowerSeries, start: float, end: float) -> bool:
     inside = (power.time >= start) & (power.time <= end)
     return bool(np.isin(power.mode[inside], [int(mode) for mode in _ASLEEP]).any())
 

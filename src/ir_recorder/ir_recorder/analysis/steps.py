@@ -83,7 +83,7 @@ def executed_steps(recording: Recording) -> tuple[ExecutedStep, ...]:
             late = max(0.0, last - ran[1]) if end else 0.0
             steps[-1:] = [_ended_at(step, ran[0]) for step in steps[-1:]]
         start, stop = ran or (_begin_of(event, steps) - late, last - late)
-        if ran is None and _unseen(
+        if ran is None and _is_unseen(
             event.movement
         ):  # its events are as far apart as the nodes' answers
             stop = min(stop, start + event.movement.report.duration)
@@ -101,7 +101,7 @@ def executed_steps(recording: Recording) -> tuple[ExecutedStep, ...]:
     return tuple(steps)
 
 
-def _unseen(movement: PlannedMovement) -> bool:
+def _is_unseen(movement: PlannedMovement) -> bool:
     return not movement.is_pause and 0.0 < movement.report.duration < UNSEEN
 
 
@@ -112,7 +112,7 @@ def _ended_at(step: ExecutedStep, moves: float) -> ExecutedStep:
     late = max(0.0, step.end - moves)
     if step.movement.is_pause:
         return replace(step, end=max(step.start, step.end - late))
-    if _unseen(step.movement):
+    if _is_unseen(step.movement):
         return replace(step, start=step.start - late, end=step.end - late)
     return step
 

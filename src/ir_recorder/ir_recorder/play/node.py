@@ -245,7 +245,7 @@ class PlayNode(Node):
             self._commands.append(topic)
 
     def _play(self) -> None:
-        if self._stop.wait(max(self._delay, LEAST_DELAY)) or self._refused():
+        if self._stop.wait(max(self._delay, LEAST_DELAY)) or self._is_refused():
             return
         tick = self._tick if self._ticks is not None else None
         player = Player(
@@ -257,7 +257,7 @@ class PlayNode(Node):
             self.get_logger().error(traceback.format_exc())
             self.failure = f"playback failed: {error!r}"
 
-    def _refused(self) -> bool:
+    def _is_refused(self) -> bool:
         """Whether playback ends, because a driver would follow its commands or nothing is left to
         play; looks at the graph every LOOK_PERIOD.
         """
@@ -313,13 +313,13 @@ class PlayNode(Node):
         self._stop.set()
 
     def _publish(self, message: DueMessage) -> None:
-        if self._refused() or message.topic in self._left_out:
+        if self._is_refused() or message.topic in self._left_out:
             return
         self._feeds[message.topic].publish(message.data)
         self.published += 1
 
     def _tick(self, recorded_ns: int) -> None:
-        if self._ticks is None or self._refused() or _CLOCK in self._left_out:
+        if self._ticks is None or self._is_refused() or _CLOCK in self._left_out:
             return
         clock = Clock()
         clock.clock.sec, clock.clock.nanosec = divmod(recorded_ns, 1_000_000_000)

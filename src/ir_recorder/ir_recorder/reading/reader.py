@@ -405,7 +405,7 @@ class _SeriesReader:
 
         def of(time: float, message: Any) -> Iterator[TextEvent]:
             for status in message.status:
-                if not self._of_driver(status.name):
+                if not self._is_of_driver(status.name):
                     continue
                 for pair in status.values:
                     if pair.key == "load":
@@ -466,12 +466,12 @@ class _SeriesReader:
     def _hardware(self) -> str:
         def of(time: float, message: Any) -> Iterator[str]:
             for status in message.status:
-                if self._of_driver(status.name) and status.hardware_id:
+                if self._is_of_driver(status.name) and status.hardware_id:
                     yield str(status.hardware_id)
 
         return next(self._values(names.DIAGNOSTICS, of), "")
 
-    def _of_driver(self, name: str) -> bool:
+    def _is_of_driver(self, name: str) -> bool:
         return names.SIM_DRIVER in name and owns_diagnostic(self._namespace, name)
 
     def _text(self, name: str) -> str:

@@ -59,7 +59,7 @@ class TopicSelection:
     namespace: str = "/"
 
     def __contains__(self, topic: str) -> bool:
-        if _hidden(topic) and not topic.endswith(ACTION_STATUS):
+        if _is_hidden(topic) and not topic.endswith(ACTION_STATUS):
             return False
         if self.wanted:
             return any(fnmatchcase(topic, self._absolute(pattern)) for pattern in self.wanted)
@@ -92,5 +92,5 @@ def single_type(topic: str, types: Sequence[str]) -> str | None:
     return types[0]
 
 
-def _hidden(topic: str) -> bool:
+def _is_hidden(topic: str) -> bool:
     return any(part.startswith("_") for part in topic.split("/"))

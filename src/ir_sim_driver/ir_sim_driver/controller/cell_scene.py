@@ -41,7 +41,7 @@ class MachinesInScene:
 
     def stand_in(self, cell: Cell) -> None:
         """Machines of another cell; a door that is switched as before stays as it is."""
-        before = {name: state for name, state in self._states.items() if self._switched(name)}
+        before = {name: state for name, state in self._states.items() if self._is_switched(name)}
         self.cell = cell
         self._states = {machine.name: machine.state for machine in cell.equipment}
         for machine in cell.equipment:
@@ -51,10 +51,10 @@ class MachinesInScene:
         self._moving = {
             name: change
             for name, change in self._moving.items()
-            if name in before and self._switched(name)
+            if name in before and self._is_switched(name)
         }
 
-    def _switched(self, name: str) -> bool:
+    def _is_switched(self, name: str) -> bool:
         return any(
             machine.name == name and machine.switch is not None for machine in self.cell.equipment
         )
@@ -212,15 +212,15 @@ class Parts:
         """
         first, last = (self.cell.station(name).pose for name in (route.visits[0], route.visits[-1]))
         for name, place in list(self._places.items()):
-            room = any(_same(place, station) for station in self._rooms)
-            if room or _same(place, last):
+            room = any(_is_at_station(place, station) for station in self._rooms)
+            if room or _is_at_station(place, last):
                 del self._places[name]
             if room:
                 self._inside.add(name)
         there = self._held | self._places.keys() | self._inside
         absent = (part.name for part in self.cell.parts if part.name not in there)
         following = route.following(absent)
-        if following and not any(_same(place, first) for place in self._places.values()):
+        if following and not any(_is_at_station(place, first) for place in self._places.values()):
             self._places[following] = first
 
     def bodies(self) -> tuple[Body, ...]:
@@ -230,7 +230,7 @@ class Parts:
         )
 
 
-def _same(place: FloatArray, station: FloatArray) -> bool:
+def _is_at_station(place: FloatArray, station: FloatArray) -> bool:
     """Whether a part was put down at a station: the tcp was there within what it may be off its
     path.
     """

@@ -244,7 +244,7 @@ class Simulation:
     @property
     def stands(self) -> bool:
         """Whether the robot stands and nothing waits to move it."""
-        return self._still() and not self.executor.active
+        return self._is_still() and not self.executor.active
 
     @property
     def stopped(self) -> bool:
@@ -436,7 +436,7 @@ class Simulation:
             dt,
             motion=active
             and (executor.path_speed > 0.0 or executor.stopping or self.speed_scaling.now() > 0.0),
-            standing=self._still(),
+            standing=self._is_still(),
             emergency=self.safety.stopped,
         )
         if changed is not None:
@@ -464,7 +464,7 @@ class Simulation:
             self.load_checks.look(self.backend)
         self.safety.supervise(motors_on, self.settings.execution.tube)
 
-    def _still(self) -> bool:
+    def _is_still(self) -> bool:
         still = self.executor.path_speed == 0.0 and self.backend.standing
         return still and not self.safety.emergency.stopping
 

@@ -377,13 +377,13 @@ def _sure(
         said.append(
             f"No difference of {_TIE:.1%} is shown to {', '.join(alike)}.".replace("%", " %")
         )
-    if _judged(settings) and not behind(runs, settings):
+    if _is_judged(settings) and not behind(runs, settings):
         said.append(f"In no cell is anybody shown to be ahead of the {PORTFOLIO}.")
     return said
 
 
 def _to_do(ranking: _Ranking, runs: Sequence[ArenaRun], settings: ArenaSettings) -> str:
-    if not _judged(settings):
+    if not _is_judged(settings):
         return ""
     if ranking.winner != PORTFOLIO:
         return (
@@ -441,7 +441,7 @@ def behind(runs: Sequence[ArenaRun], settings: ArenaSettings) -> list[str]:
     return said
 
 
-def _judged(settings: ArenaSettings) -> bool:
+def _is_judged(settings: ArenaSettings) -> bool:
     return PORTFOLIO in settings.planners and len(settings.planners) > 1
 
 
@@ -451,7 +451,7 @@ def _verdict(
     """The badge: how many runs were made of all, or, with all of them, whether the default wins."""
     if missing:
         return f"{len(runs)} of {len(runs) + missing} runs", False
-    if ranking is None or not _judged(settings):
+    if ranking is None or not _is_judged(settings):
         return "", False
     if ranking.winner == PORTFOLIO:
         return "Nobody is ahead of the default", True
@@ -462,7 +462,7 @@ def verdict(runs: Sequence[ArenaRun], settings: ArenaSettings) -> str:
     """Where somebody solved more than the portfolio or costs less, as a section; "" where nobody
     is to be named.
     """
-    if not _judged(settings):
+    if not _is_judged(settings):
         return ""
     items = "".join(f"<li>{text(words)}</li>" for words in behind(runs, settings))
     head = f"Where another one is ahead of the {PORTFOLIO}"

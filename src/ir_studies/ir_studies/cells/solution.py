@@ -128,17 +128,17 @@ class _Search:
         self._root()
         if self._bound < np.inf and len(self._instance.robots) >= _MANY:
             is_easy = self._whole(self._seconds * _EASY_SHARE)
-            if not (is_easy or self._done):
+            if not (is_easy or self._is_done):
                 self._part_by_part()
         rounds = 0
-        while self._left > 0.0 and not self._done and rounds < _MOST_ROUNDS:
+        while self._left > 0.0 and not self._is_done and rounds < _MOST_ROUNDS:
             self._whole(self._left)
             rounds += 1
         spent = time.process_time() - self._begun
         return CellAnswer(self._instance, self._best, self._bound, spent, self._first)
 
     @property
-    def _done(self) -> bool:
+    def _is_done(self) -> bool:
         if self._best is None:
             return self._bound == np.inf
         energy = self._best.energy
@@ -193,7 +193,7 @@ class _Search:
         found = self._best is not None
         if not (found or self._relax_and_fix(2) or self._first_of_all() or self._relax_and_fix(3)):
             return
-        if not self._done:
+        if not self._is_done:
             self._bound_by_robots()
             self._improve()
 
@@ -210,7 +210,7 @@ class _Search:
         ]
         idle = 0
         for held in itertools.cycle(parts):
-            if self._done or self._left < self._seconds * _WHOLE_SHARE or idle == len(parts):
+            if self._is_done or self._left < self._seconds * _WHOLE_SHARE or idle == len(parts):
                 return
             idle = 0 if self._anew(held) else idle + 1
 
@@ -234,7 +234,7 @@ class _Search:
         order = sorted(alone, key=lambda robot: (-alone[robot], robot))
         together = set(order[:1])
         for robot in order[1:]:
-            if self._done or self._left <= end or alone[robot] <= root * (1.0 + PROVED):
+            if self._is_done or self._left <= end or alone[robot] <= root * (1.0 + PROVED):
                 return
             if self._bound_of(together | {robot}).finished:
                 together.add(robot)

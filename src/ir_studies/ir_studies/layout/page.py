@@ -902,11 +902,11 @@ def _remove_best(folder: Path, name: str, kept: int) -> None:
     """Remove the best of a study in this folder that kept more; other cells stay."""
     for path in folder.glob("best_*.yaml"):
         rank = path.stem.removeprefix("best_")
-        if rank.isdecimal() and int(rank) > kept and _named(path, f"{name}_best_{rank}"):
+        if rank.isdecimal() and int(rank) > kept and _is_named(path, f"{name}_best_{rank}"):
             path.unlink()
 
 
-def _named(path: Path, name: str) -> bool:
+def _is_named(path: Path, name: str) -> bool:
     """Whether a file is a cell of that name, as it was written here."""
     if path.is_symlink() or not path.is_file():
         return False

@@ -112,7 +112,9 @@ def _depth(first: _Solid | _Plane, second: _Solid | _Plane) -> float:
             -_least_height(each, second.pose) for each in (first.points, first.smaller)
         )
         return below if smaller > 0.0 else 0.0
-    if not _near(first.smaller, second.smaller) or separable(first.smaller, second.smaller):
+    if not _boxes_overlap(first.smaller, second.smaller) or separable(
+        first.smaller, second.smaller
+    ):
         return 0.0
     return penetration(first.points, second.points)
 
@@ -133,7 +135,7 @@ def penetration(first: FloatArray, second: FloatArray) -> float:
     return max(float(-hull.equations[:, 3].max()), TOUCHING)
 
 
-def _near(first: FloatArray, second: FloatArray) -> bool:
+def _boxes_overlap(first: FloatArray, second: FloatArray) -> bool:
     """Whether the boxes along the axes overlap."""
     apart = (first.min(axis=0) > second.max(axis=0)) | (second.min(axis=0) > first.max(axis=0))
     return not bool(apart.any())

@@ -191,7 +191,7 @@ def findings_of(rows: Sequence[Row]) -> Findings:
         len(both),
         len(both) - len(own),
         len({_movements(row, k) for k, row in enumerate(own)}),
-        sum(_slower(row) for row in own),
+        sum(_is_slower(row) for row in own),
         together(
             [
                 replace(compared(name, own, _of(ASYNCHRONOUS, it), _of(SYNCHRONOUS, it)), unit=unit)
@@ -281,7 +281,7 @@ def _movements(row: Row, k: int) -> tuple[object, ...]:
     return tuple(row[timing].get("trajectory_id", k) for timing in (SYNCHRONOUS, ASYNCHRONOUS))
 
 
-def _slower(row: Row) -> bool:
+def _is_slower(row: Row) -> bool:
     own, common = (number(row[timing], "duration_s") for timing in (ASYNCHRONOUS, SYNCHRONOUS))
     return own > common * (1.0 + 0.01 * ALIKE)
 

@@ -118,13 +118,13 @@ def drive_sheet(text: str, source: str, arm: UrdfArm) -> DriveSheet:
     known["rated_payload_kg"] = _value(
         top["rated_payload_kg"], lambda item: item.number(0, 1e4, "kg", above=True)
     )
-    if "machine_home_deg" in top and not _unknown(top["machine_home_deg"]):
+    if "machine_home_deg" in top and not _is_unknown(top["machine_home_deg"]):
         known["machine_home_deg"] = _value(
             top["machine_home_deg"], lambda item: item.numbers(AXES, -3600, 3600, "deg")
         )
-    if "envelope_rad_s_nm" in top and not _unknown(top["envelope_rad_s_nm"]):
+    if "envelope_rad_s_nm" in top and not _is_unknown(top["envelope_rad_s_nm"]):
         known["envelope_rad_s_nm"] = _value(top["envelope_rad_s_nm"], _envelope)
-    if "wrist_coupling" in top and not _unknown(top["wrist_coupling"]):
+    if "wrist_coupling" in top and not _is_unknown(top["wrist_coupling"]):
         known["wrist_coupling"] = _value(
             top["wrist_coupling"], lambda item: item.rows(3, -10, 16, count=(1, AXES))
         )
@@ -159,13 +159,13 @@ def with_home(sheet: DriveSheet, home: Value) -> DriveSheet:
     return replace(sheet, values={**sheet.values, "machine_home_deg": home})
 
 
-def _unknown(item: Item) -> bool:
+def _is_unknown(item: Item) -> bool:
     return item.is_scalar() and item.text() == UNKNOWN
 
 
 def _given_values(top: Table, key: str, unit: str, low: float) -> Value | None:
     """A figure of every axis, None where it is not given or unknown."""
-    if key not in top or _unknown(top[key]):
+    if key not in top or _is_unknown(top[key]):
         return None
     return _value(top[key], lambda item: item.numbers(AXES, low, 1e12, unit))
 

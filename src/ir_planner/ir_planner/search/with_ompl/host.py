@@ -237,7 +237,7 @@ def _answer(connection: Connection, process: int, problem: OmplProblem, work: Wo
         sheet.flush()
         try:
             send_handle(connection, sheet.fileno(), process)
-            if not _answered(connection, work):
+            if not _has_answered(connection, work):
                 return OmplAnswer(None)
             connection.recv()
         except (EOFError, OSError):
@@ -247,7 +247,7 @@ def _answer(connection: Connection, process: int, problem: OmplProblem, work: Wo
         return outcome
 
 
-def _answered(connection: Connection, work: Work) -> bool:
+def _has_answered(connection: Connection, work: Work) -> bool:
     """Whether the process has answered; when the work is over it is asked for what it has found so
     far.
     """
