@@ -157,6 +157,7 @@ def run_check(arguments: argparse.Namespace) -> int:
 
 
 def _checked(looked: _Looked, *, deep: bool) -> _Checked:
+    """What was found in a cell; deep: also what the planner refuses."""
     from ir_cli.station_access import heavy_loads, stations_of
     from ir_planner.program import unknown_searches  # a planner, only for a cell that can be read
     from ir_planner.search import SEARCHES

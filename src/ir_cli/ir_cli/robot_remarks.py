@@ -152,6 +152,7 @@ def _held(
 
 
 def _speed(robot: RobotModel) -> Iterator[Remark]:
+    """Joints with an unusual ramp to full speed, or a rotor that needs more than its drive."""
     for i, name in enumerate(robot.joint_names):
         ramp = robot.velocity_max[i] / robot.acceleration_max[i]
         if not 0.02 <= ramp <= 5.0:

@@ -167,6 +167,7 @@ class Fulfilment:
         )
 
     async def _fulfil(self, request: ask.Request) -> Status:  # noqa: C901, PLR0911, PLR0912
+        """Do what a request asks for, and wait until it is done; how it ended."""
         ports = self._ports
         match request:
             case ask.Begin(index):

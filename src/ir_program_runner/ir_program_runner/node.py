@@ -231,6 +231,7 @@ class ProgramRunnerNode(Node):
         super().destroy_node()
 
     async def _run(self, goal: ServerGoalHandle) -> RunProgram.Result:
+        """A program from its goal to its result; refused while another one runs."""
         if self._progress is not None:
             running = f"program {self._progress.program_id}".strip()
             sentence = f"{running} is running: one program at a time"

@@ -99,6 +99,7 @@ class SteppedRun:
         return self.simulation.time, self.simulation.mains.energy()
 
     def _fulfil(self, request: ask.Request) -> tuple[Status, tuple[PowerMode, ...]]:  # noqa: C901, PLR0912
+        """Do what a request asks of the simulation; its status, and the modes if asked for."""
         plant = self.simulation
         match request:
             case ask.Begin():

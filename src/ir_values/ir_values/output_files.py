@@ -44,6 +44,7 @@ def replacing_text(path: str | Path) -> Iterator[IO[str]]:
 
 @contextmanager
 def _replacing(path: str | Path, new: bool, mode: str, **options: Any) -> Iterator[IO[Any]]:
+    """A stream into a file beside `path`, which takes its place at the end."""
     place = Path(os.path.realpath(path))
     before = _status(place)
     if before is not None and new:

@@ -532,6 +532,7 @@ class Session:
             self._say_planning(f"planning: {phase} {done} of {total}", done / max(total, 1))
 
     def _show_plan(self, number: int, plan: Planned) -> None:
+        """Show what was planned, compared, or why there is no plan."""
         shown = self._shown_cell
         if number != self._number or shown is None:
             return

@@ -77,6 +77,7 @@ class Assigning(Control):
     """Sets values and outputs; what signals are called is known to `_signals`."""
 
     def _assignment(self, tree: SyntaxTree) -> None:
+        """Follow an assignment to a variable, an output, a group of these, or an expected input."""
         access, expression = tree.children
         path = self.expressions.path(access)
         (name, index), where = path[0], self.place(tree)
@@ -505,6 +506,7 @@ class Motions:
         return number(value, f"{variable}.{component}", place)
 
     def _positive(self, variable: str, component: str, place: SourcePlace) -> float:
+        """A component of a system variable: above 0, and at most what its _MA allows."""
         held = self._memory.peek(variable)
         fields = held.fields if isinstance(held, Structure) else {}
         written = f"{variable}.{component}"
@@ -733,6 +735,7 @@ class Moving(Assigning):
         return built
 
     def _block(self, tree: SyntaxTree) -> SplineBlock:
+        """The motions of a SPLINE block, with its TIME_BLOCKs."""
         word, _, *parts, approximation = tree.children
         motions: list[Motion] = []
         times: list[TimeBlock] = []

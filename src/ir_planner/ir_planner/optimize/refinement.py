@@ -371,6 +371,7 @@ class Refinement:
         return solution
 
     def _optimised(self, solution: Solution, path: FloatArray) -> Solution:
+        """The end of one descent, with as many evaluations as the work affords."""
         work = self.context.work
         robot = self.context.scene.cell.robot
         spline = solution.spline

@@ -380,6 +380,7 @@ class _Analyser:
         cell: Cell | None,
         indirect: IndirectMeter | None,
     ) -> StepResult:
+        """What a step took, by all meters that there are."""
         start = step.start
         end = step.end
         moved = indirect is not None and not step.movement.is_pause

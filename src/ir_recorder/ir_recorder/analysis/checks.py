@@ -493,6 +493,7 @@ def _runs(analysis: Analysis) -> Iterator[list[ExecutedStep]]:
 
 
 def _at_rest(analysis: Analysis, bounds: Tolerances) -> Iterator[Finding]:
+    """Power of each plateau at machine home against the data, and against Table II."""
     for row in analysis.plateaus:
         share = f"{bounds.resting_relative * 100.0:g} %"
         note = f"{row.seconds:.1f} s at machine home"

@@ -89,6 +89,7 @@ def collision_model(cell: Cell, load: str, places: PartPlaces) -> CollisionModel
 def _along(
     cell: Cell, joints: JointSeries, step: ExecutedStep, places: PartPlaces
 ) -> StepClearance | None:
+    """The nearest pairs along a driven step; None where its positions are missing."""
     rows = np.flatnonzero((joints.time >= step.start - 1e-9) & (joints.time <= step.end + 1e-9))
     rows = rows[np.isfinite(joints.position[rows]).all(axis=1)]
     if not len(rows) or joints.position.shape[1] != cell.robot.n:

@@ -61,6 +61,7 @@ class IndirectMeter:
         return self._by(self._second, start, end, loads) if available() else NAN
 
     def _by(self, model: PowerModel, start: float, end: float, loads: tuple[Load, ...]) -> float:
+        """Energy [J] between two times [s] by a model of power; NaN where positions are too few."""
         joints = self._joints
         rows = (joints.time >= start - _AROUND) & (joints.time <= end + _AROUND)
         if np.count_nonzero(rows) < 2 or joints.position.shape[1] != self._robot.n:

@@ -183,6 +183,7 @@ def drives_only(analysis: Analysis) -> bool:
 
 
 def _cycle_of(analysis: Analysis) -> Production | None:
+    """The driven program's, else the planned one's; None where there is neither."""
     if analysis.program is not None:
         return _driven(analysis, analysis.program)
     planned = analysis.recording.planned
@@ -690,6 +691,7 @@ def levers(analysis: Analysis, most: int = 5) -> tuple[Lever, ...]:
 
 
 def _drive_levers(flows: EnergyFlows) -> list[Lever]:
+    """What smaller losses of the drives could save."""
     return [
         Lever(
             "heat in the brake resistor",
@@ -714,6 +716,7 @@ def _drive_levers(flows: EnergyFlows) -> list[Lever]:
 
 
 def _time_levers(analysis: Analysis) -> list[Lever]:
+    """What less time in movements and in pauses could save."""
     least = min(idle_watts(analysis).values(), default=0.0)
     moving = sum(result.base_energy for result in analysis.movements)
     pauses = [result for result in analysis.steps if result.step.movement.is_pause]

@@ -88,7 +88,7 @@ class _Part:
 
 
 def _parts_to_leave_out(estimate: Estimate) -> list[_Part]:
-    """Each run, where every run moves axes of its own; else quarters of all runs."""
+    """Each run where its joints move in other runs too; else quarters of all runs."""
     known = np.unique(estimate.window)
     own = [known[(known >= run.first) & (known < _end(run))] for run in estimate.runs]
     if _all_move_elsewhere(estimate.runs):
@@ -120,6 +120,7 @@ def _without(estimate: Estimate, part: _Part) -> tuple[FloatArray, FloatArray]:
 
 
 def _metered(estimate: Estimate, parts: Sequence[_Part]) -> tuple[LeftOut, ...]:
+    """Watts of each part, predicted without it: by the fit, the data sheet, a regression."""
     assert estimate.meter is not None  # asked before
     found = []
     count = len(estimate.prior.names)
@@ -240,6 +241,7 @@ def _solved(features: FloatArray, measured: FloatArray, whole: FloatArray) -> Fl
 
 
 def _worked(estimate: Estimate, parts: Sequence[_Part]) -> tuple[LeftOut, ...]:
+    """The same for work at the shafts, by the motors' measured torques."""
     motors = estimate.motors
     assert motors is not None  # asked before
     n = motors.n

@@ -289,6 +289,7 @@ class Goals:
         return [(ended, refused(sentence)) for ended in senders]
 
     def _check_and_start(self, ticket: int, read: Read) -> None:
+        """Check a goal in the checker's thread, and start it; its sender hears of a refusal."""
         if ticket not in self._queue:  # ended by a stop while it waited
             return
         refusal = None

@@ -110,6 +110,7 @@ def _experiment(
 
 
 def _insert(database: sqlite3.Connection, run: ArenaRun, experiment: int, planner: int) -> None:
+    """Put a run and its progress into the database."""
     outcome = str(run.row.get("outcome", _STATUS[0]))
     figures = [
         run.number(name)

@@ -148,6 +148,7 @@ class CellModel:
     # One robot.
 
     def _choices(self, clock: _Clock) -> None:
+        """Which movement each hop takes, and how long it lasts."""
         p = self.program
         for hop in clock.robot.hops:
             room = clock.ends[hop.number][1] - clock.begins[hop.number][0]

@@ -123,6 +123,7 @@ class LayoutSearch:
             self._wanted |= {known.placement.key for known in batch}
 
     def _batch(self) -> list[Known]:
+        """The placements to plan next: those that could be the best by what was seen."""
         settings = self._settings
         known = self._known()
         left = sorted(
@@ -258,6 +259,7 @@ class Maker:
         return {"solved": True, "coarse": costs}
 
     def _plan(self, words: Mapping[str, Any]) -> Row:
+        """The row of a placement, from its planned program."""
         cell = self._placing.cell(self._given, words["values"], words["payload"])
         cycle = float(words["cycle_time"])
         objective = "energy" if cycle > 0.0 else "time_and_energy"

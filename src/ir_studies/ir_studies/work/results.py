@@ -104,6 +104,7 @@ class Results:
             raise
 
     def _read(self, cells: Mapping[str, str]) -> None:
+        """Take the rows of an earlier run; a line that lacks its end is cut off."""
         content = self._file.read()
         whole = content[: content.rfind(b"\n") + 1]
         head = {"format": f"ir_{self._kind}_results/1", "budget": self._budget, "cells": {}}
