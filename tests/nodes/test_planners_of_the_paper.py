@@ -17,13 +17,13 @@ from ir_msgs.srv import PlanRegionalMovement
 from ir_msgs_py.options import PlanOptions as Options
 from ir_planner import Goal, Planner
 from ir_planner.search import SEARCHES, repeatable
-from ir_planner.search.with_ompl import host
+from ir_planner.search.with_ompl import host, needs_ompl
 
 # checks: enough for this task
 SEED = 11
 WORK = 3000
 CHEAP = ("sbl", "kpiece", "rrt_connect")
-OTHERS = ("bkpiece", "lbkpiece", "prm", "rrt", "aorrtc")
+OTHERS = tuple(name for name, s in SEARCHES.items() if needs_ompl(s) and name not in CHEAP)
 
 
 @pytest.fixture

@@ -17,16 +17,17 @@ from ir_planner.regional.companions import LATE, with_own_laws
 from ir_planner.request.context import Context, Journal, Work
 from ir_planner.scene.planning_scene import PlanningScene
 from ir_planner.search import SEARCHES, Ends
+from ir_planner.search.with_ompl import needs_ompl
 
 SceneOf = Callable[[str], PlanningScene]
 
 
 # OMPL's planners have a test of their own, test_ompl_searches.py
-OF_OMPL = ("kpiece", "bkpiece", "lbkpiece", "prm", "rrt", "rrt_connect", "aorrtc")
+OWN = [name for name, search in SEARCHES.items() if not needs_ompl(search)]
 
 
 @pytest.mark.sampled
-@pytest.mark.parametrize("planner_id", ["", *(name for name in SEARCHES if name not in OF_OMPL)])
+@pytest.mark.parametrize("planner_id", ["", *OWN])
 @pytest.mark.parametrize("allowed", [1, 40, 700, 1500])
 def test_max_iterations_is_never_exceeded(planner_id: str, allowed: int, scene_of: SceneOf) -> None:
     scene = scene_of("table_columns")
