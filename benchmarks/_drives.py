@@ -1,8 +1,8 @@
 """The drives once more, independent of the compiled core: torque by Pinocchio, power, energy at the
 mains.
 
-Arm and loads are Pinocchio's; rotors, friction, the gas spring, copper losses and the DC bus follow
-from the description's data.
+Arm and loads are Pinocchio's; rotors, friction, the gas spring, copper losses and the DC link
+follow from the description's data.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@ planner.
 
 Jerk is constant in each of MESH intervals, so that the answer is exactly a trajectory of the
 project's interpolant. Torque is the symbolic recursive Newton-Euler of the tests' reference plus
-rotors, friction and the gas spring; the DC bus is exact: mains, dissipated and stored energy are
+rotors, friction and the gas spring; the DC link is exact: mains, dissipated and stored energy are
 variables of every step, and the least mains energy uses the capacitor as the bus does. One thing is
 smoothed: sign(qd) of Coulomb friction and the step of the torque envelope, over SMOOTHING rad/s.
 Obstacles are left out: what collides is dropped.

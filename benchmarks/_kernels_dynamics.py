@@ -89,7 +89,7 @@ def _dynamics(
             ns,
         ),
         Row("axis power", "", best(lambda: model.axis_power(qd, tau), SAMPLES) * 1e9, ns),
-        Row("DC bus", "", best(lambda: dc_bus(power, 0.01, bus), SAMPLES) * 1e9, ns),
+        Row("DC link", "", best(lambda: dc_bus(power, 0.01, bus), SAMPLES) * 1e9, ns),
         Row(
             "torque bounds, 8 segments",
             "",

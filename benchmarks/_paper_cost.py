@@ -239,7 +239,7 @@ EXPERIMENT = Experiment(
     "A movement is chosen by the cost W, the sum over the joints of the mass that they carry, "
     "their largest speed squared and their travel: the least W takes the least energy.",
     f"Free straight movements in the cell `open` ({DRAWN}), each as the fastest common S-curve "
-    "PTP. W and drive energy (full dynamics, shared DC bus) are ranked; the claim needs a rank "
+    "PTP. W and drive energy (full dynamics, shared DC link) are ranked; the claim needs a rank "
     f"correlation of {RANKS} (about four of five pairs in the right order).",
     measure,
     judge,

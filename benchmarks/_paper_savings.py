@@ -167,7 +167,7 @@ def _why(by: dict[str, Statement]) -> str:
     lowered = by[f"{SAME_TIME}: of those that save {-LOW:g} % or more, what lowers the tool"]
     if not lowered.count:
         return ""
-    back = ", which gives energy back that the optimised time scaling keeps on the bus"
+    back = ", which gives energy back that the optimised time scaling keeps in the DC link"
     return (
         f"Of the {lowered.count} movements that save {-LOW:g} % or more, {lowered.value:.0f} % "
         f"lower the tool{back if lowered.low > 50.0 else ''}. "
@@ -211,7 +211,7 @@ EXPERIMENT = Experiment(
     f"Free straight movements in `open` ({DRAWN}). Reference: the fastest common S-curve PTP "
     "between the same configurations. Answers of the planner: of the same duration, and free in "
     "time for J, for time, and for W; beside least J the PTP, slowed down as is best for J. "
-    "E_drive by the full dynamics on a shared DC bus. Relative changes only where the reference "
+    "E_drive by the full dynamics on a shared DC link. Relative changes only where the reference "
     f"is at least {LARGE / 1e3:g} kJ.",
     measure,
     judge,

@@ -261,7 +261,7 @@ def coupled(robot: RobotLiteral, seed: int) -> RobotLiteral:
 def power_gradients(
     model: DynamicsModel, q: FloatArray, qd: FloatArray, qdd: FloatArray
 ) -> Gradients:
-    """Derivatives (N, n, n) of the axes' power at the DC bus along a motion (N, n)."""
+    """Derivatives (N, n, n) of the axes' power at the DC link along a motion (N, n)."""
     torque = model.inverse_dynamics(q, qd, qdd)
     of = model.torque_gradients(q, qd, qdd)
     data = model.data

@@ -1,4 +1,4 @@
-"""The DC bus: where braking energy goes, and that none is lost or made."""
+"""The DC link: where braking energy goes, and that none is lost or made."""
 
 from typing import Any
 

@@ -110,7 +110,7 @@ def test_every_node_gives_what_it_takes(
         lifted * 0.01,
         lifted * 0.01 * lowered,
     )
-    for node in ("DC bus", "axes"):
+    for node in ("DC link", "axes"):
         into = sum(value for _, to, value in rows(flows) if to in (node, f"back to the {node}"))
         out = sum(value for source, _, value in rows(flows) if source == node)
         assert into == pytest.approx(out, rel=1e-9, abs=1e-6 * mains)

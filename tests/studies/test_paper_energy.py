@@ -1,4 +1,4 @@
-"""Joules and limits of the experiments on the paper's claims, by Pinocchio and a DC bus written
+"""Joules and limits of the experiments on the paper's claims, by Pinocchio and a DC link written
 here.
 """
 

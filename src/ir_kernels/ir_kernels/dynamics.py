@@ -28,7 +28,7 @@ from ir_kernels.reference import dynamics as reference
 from ir_kernels.reference import enclosures
 from ir_values.arrays import FloatArray
 
-# What the axes take from the DC bus at most, between samples too.
+# What the axes take from the DC link at most, between samples too.
 
 
 @dataclass(frozen=True)
@@ -204,7 +204,7 @@ class DynamicsModel:
         return np.asarray(self._run("torque_limit", qd=qd))
 
     def axis_power(self, qd: ArrayLike, tau: ArrayLike) -> FloatArray:
-        """Power (N, n) W each axis takes from the DC bus: tau w + k_cu (tau / ratio)^2, with the
+        """Power (N, n) W each axis takes from the DC link: tau w + k_cu (tau / ratio)^2, with the
         losses of iron, inverter and gear that the robot has; negative while braking.
         """
         power = np.asarray(self._run("axis_power", qd=qd, tau=tau))
@@ -225,7 +225,7 @@ class DynamicsModel:
         return np.asarray(d.iron_loss * (speed * speed) + by_torque + d.idle_loss)
 
     def drive_power(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> FloatArray:
-        """Power (N, n) W each axis takes from the DC bus along a motion: `axis_power` of
+        """Power (N, n) W each axis takes from the DC link along a motion: `axis_power` of
         `inverse_dynamics`.
         """
         return self.axis_power(qd, self.inverse_dynamics(q, qd, qdd))
@@ -263,7 +263,7 @@ class DynamicsModel:
     def power_bounds(
         self, coefficients: ArrayLike, durations: ArrayLike, longest: float = 2e-3
     ) -> PowerBounds:
-        """Bounds of the power that the axes take from the DC bus along q(t) = sum_k c_k t^k, by
+        """Bounds of the power that the axes take from the DC link along q(t) = sum_k c_k t^k, by
         interval arithmetic over pieces of at most `longest` s; half as long a piece leaves a fourth
         of the excess.
 

@@ -1,7 +1,7 @@
-"""From joint torques to joules at the mains: axis power, the common DC bus, energy of a sampled
+"""From joint torques to joules at the mains: axis power, the DC link, energy of a sampled
 trajectory.
 
-The axes of one controller share a DC bus that the supply only feeds (it rectifies). What braking
+The axes of one controller share a DC link that the supply only feeds (it rectifies). What braking
 axes give back goes to the other axes, then into the capacitor; the rest is dissipated in the brake
 resistor.
 """
@@ -24,7 +24,7 @@ REGENERATIONS: tuple[Regeneration, ...] = ("shared", "none", "fed_back")
 
 @dataclass(frozen=True)
 class DcBusParameters:
-    """What the bus can do with braking energy.
+    """What the DC link can do with braking energy.
 
     capacity_energy [J]: what fits into the capacitor between rest voltage and brake chopper, C
     (U_on^2 - U_0^2) / 2. regeneration: "shared" (the surplus beyond the capacitor is dissipated),
@@ -74,7 +74,7 @@ def dc_bus(
     *,
     core: compiled.Core = compiled.MODULE,
 ) -> DcBus:
-    """Run the DC bus over N steps in which the axes take constant powers `axis_power` (N, n) W.
+    """Run the DC link over N steps in which the axes take constant powers `axis_power` (N, n) W.
 
     `dt`: length of the steps, one number or (N,), s. `stored` [J]: in the capacitor (above its rest
     voltage) before the first step. In every step, with P the signed sum of the axes:

@@ -5,13 +5,13 @@ at an end mean rest there. The cost is
 
     energy_value E + time_value T + sum_j travel_j int |qd_j| dt + penalties
 
-with E the drives' energy at the mains over the common DC bus. What exceeds a bound is punished by
+with E the drives' energy at the mains over the DC link. What exceeds a bound is punished by
 the square of its relative excess over time: speed, torque (of its share of the envelope) at
 samples, acceleration at the knots, jerk between them, position by the control points; and
 clearance, for every pair nearer than its threshold and `clearance_margin`, in units of
 `clearance_scale`. Near standstill friction and |qd| are smoothed, so that the cost has derivatives,
-and torque is judged with all of the friction; `smoothing` rounds the switch of the bus. Samples lie
-on the knots, where torque peaks, and midway between. Nothing here is a proof: see
+and torque is judged with all of the friction; `smoothing` rounds the switch of the DC link. Samples
+lie on the knots, where torque peaks, and midway between. Nothing here is a proof: see
 CollisionModel.certify_trajectory and DynamicsModel.torque_bounds.
 """
 

@@ -31,11 +31,11 @@ class SplineTerms:
     threshold (R, Z) m: rows of safety distances, each interval of a spline says which row holds;
     -inf leaves a pair out. torque_share: of the envelope. energy_value: cost per joule; time_value:
     per second, 0 leaves it out (what a second is worth is the robot's or the request's to say).
-    capacity_energy [J] and regeneration: see DcBusParameters; smoothing [W]: by how much the bus'
-    switch between mains, capacitor and resistor is rounded, 0: not at all. clearance_margin,
-    clearance_scale [m]. penalty, clearance_penalty: cost per second of a relative excess of 1.
-    tilt_axis (3,) in the last link may lean by tilt_max [rad] from tilt_direction (3,) in the
-    world, pi: as it likes; an excess of tilt_scale [rad] counts like one of 1, with
+    capacity_energy [J] and regeneration: see DcBusParameters; smoothing [W]: by how much the switch
+    of the DC link between mains, capacitor and resistor is rounded, 0: not at all.
+    clearance_margin, clearance_scale [m]. penalty, clearance_penalty: cost per second of a relative
+    excess of 1. tilt_axis (3,) in the last link may lean by tilt_max [rad] from tilt_direction (3,)
+    in the world, pi: as it likes; an excess of tilt_scale [rad] counts like one of 1, with
     clearance_penalty.
     """
 

@@ -240,10 +240,10 @@ class PowerState:
 
     time_to_target [s], 0 when the target mode is reached; power [W]: mean since the last reading;
     energy [J] since the meter started; base_power [W] of controller, drives and tool; bus_voltage
-    [V]; burnt_power [W]; joint_power (n,) [W] at the DC bus; joint_torque (n,) [Nm] of the motor at
-    the joint; joint_current (n,) [A] of the motors and joint_temperature (n,) [deg C] of the gears,
-    empty where the plant has none; rectifier_loss [W]; tool_power [W], a part of base_power; plant:
-    what is simulated.
+    [V]; burnt_power [W]; joint_power (n,) [W] at the DC link; joint_torque (n,) [Nm] of the motor
+    at the joint; joint_current (n,) [A] of the motors and joint_temperature (n,) [deg C] of the
+    gears, empty where the plant has none; rectifier_loss [W]; tool_power [W], a part of base_power;
+    plant: what is simulated.
     """
 
     stamp_ns: int

@@ -76,7 +76,7 @@ class TrajectoryReport:
 
     duration [s]; movement_cost: W of eq. (9), not joules; energy at the mains with its 90 %
     interval energy_low to energy_high (from the uncertainty of power_parameters), joint_energy (n,)
-    at the DC bus (signed), base_energy of controller, drives and tool, burnt_energy in the brake
+    at the DC link (signed), base_energy of controller, drives and tool, burnt_energy in the brake
     resistor [J]; peak_power [W]; min_clearance [m] over all pairs without an allowed contact (inf:
     no pair), closest: that pair at closest_time [s]; safety_distance: S_m [m] that it was planned
     or judged with, 0 where nobody said; *_ratio (n,): largest used share of each joint's limit;

@@ -41,7 +41,7 @@ class PlannerSettings:
     )
     regeneration: str = setting(
         "shared",
-        "Braking energy: shared over the DC bus, none, or fed_back to the mains.",
+        "Braking energy: shared over the DC link, none, or fed_back to the mains.",
         choices=("shared", "none", "fed_back"),
     )
     torque_reserve: float = setting(

@@ -279,8 +279,8 @@ def torque_limit(data: DynamicsData, qd: FloatArray) -> FloatArray:
 
 
 def axis_power(data: DynamicsData, qd: FloatArray, tau: FloatArray) -> FloatArray:
-    """Power each axis takes from the DC bus (N, n) W: mechanical plus copper losses, negative while
-    braking.
+    """Power each axis takes from the DC link (N, n) W: mechanical plus copper losses, negative
+    while braking.
     """
     return tau * motor_speed(data, qd) + data.copper_loss * (tau / data.gear_ratio) ** 2
 
@@ -309,7 +309,7 @@ def torque_gradients(
     return of_q, of_qd, H + np.diag(data.rotor_inertia)
 
 
-# The drives' common DC bus, step by step: the oracle of the compiled scan.
+# The drives' DC link, step by step: the oracle of the compiled scan.
 
 
 def dc_bus(

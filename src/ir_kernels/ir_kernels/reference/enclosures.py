@@ -242,7 +242,7 @@ def torque_bounds(
     return upper, sampled, time, spent
 
 
-# Enclosures of the power that the axes take from the DC bus over short pieces of time.
+# Enclosures of the power that the axes take from the DC link over short pieces of time.
 
 
 def power_bounds(

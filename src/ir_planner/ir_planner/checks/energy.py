@@ -1,4 +1,4 @@
-"""Energy of a trajectory at the mains: torque of every axis, their common DC bus, and what is
+"""Energy of a trajectory at the mains: torque of every axis, their DC link, and what is
 always drawn.
 
 Energy = base + sum of the axes (signed) + dissipated + change of the capacitor, and what the
@@ -24,11 +24,11 @@ _PIECE = 20_000  # samples at a time: an hour has millions
 
 @dataclass(frozen=True)
 class MovementEnergy:
-    """Joules of a movement: total at the mains, base load, per joint (n,) at the DC bus (signed),
+    """Joules of a movement: total at the mains, base load, per joint (n,) at the DC link (signed),
     dissipated, capacitor.
 
     dt [s]: of the steps; times (N,) s (their middles) and watts (N,) at the mains: its profile;
-    axes (N,) W: what all joints together take from the DC bus (none: where nothing is shared).
+    axes (N,) W: what all joints together take from the DC link (none: where nothing is shared).
     """
 
     total: float
@@ -80,7 +80,7 @@ def _on_bus(
     times: FloatArray,
     axes: FloatArray,
 ) -> MovementEnergy:
-    """Joules of a movement from what its axes drew of the common bus: the rectifier loses its share
+    """Joules of a movement from what its axes drew of the DC link: the rectifier loses its share
     in either direction, and the base load of controller and tool is added. Steps last dt s.
     """
     base = scene.base_watts
@@ -100,7 +100,7 @@ def _on_bus(
 
 
 def _axis_power(trajectory: JointTrajectory, scene: PlanningScene, times: FloatArray) -> FloatArray:
-    """What each axis takes from the DC bus (N, n) W at times (N,) s."""
+    """What each axis takes from the DC link (N, n) W at times (N,) s."""
     motion = motion_at(trajectory, times)
     torque = scene.dynamics.inverse_dynamics(motion.q, motion.qd, motion.qdd)
     return scene.dynamics.axis_power(motion.qd, torque)

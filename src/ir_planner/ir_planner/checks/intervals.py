@@ -1,7 +1,7 @@
 """Intervals of energies: what the uncertainty of the power parameters leaves open.
 
-Mains energy is piecewise linear in powers. What a joule more from the bus costs at the mains is 1
-while the mains feed it, 0 while the surplus is dissipated, and what the next such time says while
+Mains energy is piecewise linear in powers. What a joule more from the DC link costs at the mains is
+1 while the mains feed it, 0 while the surplus is dissipated, and what the next such time says while
 the capacitor does both. So one pass over the samples of a movement gives its derivative by each
 power parameter, and the energies of many robots are one product with it. Slopes are taken at the
 mean of the drawn robots, where optimised movements no longer balance between drawing power and
@@ -74,7 +74,7 @@ def energy_and_slope(at: Sampled, scene: PlanningScene) -> tuple[float, FloatArr
 
 
 def _powers(at: Sampled, scene: PlanningScene) -> tuple[FloatArray, FloatArray, DcBus]:
-    """Torque (N, n) Nm, power of the axes (N, n) W, and what the bus makes of it."""
+    """Torque (N, n) Nm, power of the axes (N, n) W, and what the DC link makes of it."""
     motion = at.motion
     torque = scene.dynamics.inverse_dynamics(motion.q, motion.qd, motion.qdd)
     power = scene.dynamics.axis_power(motion.qd, torque)
@@ -82,7 +82,7 @@ def _powers(at: Sampled, scene: PlanningScene) -> tuple[FloatArray, FloatArray, 
 
 
 def _drawn(bus: DcBus, dt: float) -> float:
-    """Joules that the bus takes from the rectifier, less those that go back."""
+    """Joules that the DC link takes from the rectifier, less those that go back."""
     return float(bus.mains.sum()) * dt
 
 

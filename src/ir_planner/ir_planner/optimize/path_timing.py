@@ -180,7 +180,7 @@ def optimised_profile(
 ) -> tuple[FloatArray, float, int]:
     """s (count - 3,) at the inner knots, duration [s] and evaluations, from a profile s and its
     duration, which stays where the request has one. effort: stiffness of penalties, against the
-    power that the objective is about, smoothing of the bus [W], and evaluations.
+    power that the objective is about, smoothing of the DC link [W], and evaluations.
     """
     weights = objective_weights(context, path.q[::_SPARSE])
     stiffness, smoothing, most = effort
@@ -337,8 +337,8 @@ _LONGER = 1.03  # what passing points exactly may cost in time
 @dataclass(frozen=True)
 class TimingEffort:
     """Evaluations of the cost per descent; in each the stiffness of the penalties, against the
-    objective's power, and the W over which the bus' switch is rounded. Each has twice the knots of
-    the one before.
+    objective's power, and the W over which the DC link's switch is rounded. Each has twice the
+    knots of the one before.
     """
 
     evaluations: int

@@ -40,7 +40,7 @@ from ir_values.arrays import BoolArray, FloatArray
 # The stages of a descent lead from a coarse spline and a smooth cost to a fine spline and the exact
 # bus.
 #
-# A movement of least energy holds the power of the common bus near zero for long: one joint takes
+# A movement of least energy holds the power of the DC link near zero for long: one joint takes
 # what another gives. There the cost of a joule jumps from nothing to its full price, and a descent
 # on the exact bus ends at the kink long before the least energy. So the switch is rounded, less
 # from stage to stage, until the rounding weighs less than NEGLIGIBLE of the cost: movements of few
@@ -52,7 +52,7 @@ NEGLIGIBLE = 5e-3  # share of the cost
 @dataclass(frozen=True)
 class DescentStage:
     """One descent: halvings of the coarse spline's intervals (level), W over which the switch of
-    the bus is rounded, stiffness of the penalties, evaluations of the cost, and the gain of ten
+    the DC link is rounded, stiffness of the penalties, evaluations of the cost, and the gain of ten
     steps that ends it.
     """
 
@@ -85,7 +85,7 @@ class Effort:
 
 
 def decisive(stage: DescentStage, last: DescentStage, rounding: float) -> DescentStage:
-    """The stage itself, or the last one at once where the rounding of the bus, in shares of the
+    """The stage itself, or the last one at once where the rounding of the DC link, in shares of the
     cost per W of smoothing, doesn't matter any more.
     """
     return replace(last, level=stage.level) if stage.smoothing * rounding < NEGLIGIBLE else stage

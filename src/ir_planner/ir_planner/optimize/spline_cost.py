@@ -37,7 +37,7 @@ def spline_cost(
     excess of 1.
 
     threshold (R, Z) m: what the pairs must keep; None: path and clearance are given and cost
-    nothing. smoothing [W]: of the bus' switch. upright [rad]: by how much less than it may the
+    nothing. smoothing [W]: of the DC link's switch. upright [rad]: by how much less than it may the
     tool is to lean.
     """
     scene = context.scene

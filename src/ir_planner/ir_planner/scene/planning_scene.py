@@ -39,7 +39,7 @@ from ir_values.arrays import BoolArray, FloatArray
 
 @dataclass(frozen=True)
 class Drives:
-    """regeneration: what the bus does with braking energy. torque_reserve: share of the torque
+    """regeneration: what the DC link does with braking energy. torque_reserve: share of the torque
     envelope that plans leave to the feedback. parameters: None, as the data have them. voltage:
     where current and voltage bound the torque, eq. (8), not the envelope of the data.
     """
@@ -51,7 +51,7 @@ class Drives:
 
     @property
     def rectifier_efficiency(self) -> float:
-        """Share of the mains power that reaches the bus."""
+        """Share of the mains power that reaches the DC link."""
         return 1.0 if self.parameters is None else self.parameters.value("rectifier_efficiency")
 
     @property

@@ -197,7 +197,7 @@ def _planned_sums(name: str, results: Sequence[StepResult]) -> Share:
 def lost_charges(steps: Sequence[ExecutedStep], meter: Meter | None, link: DcLink) -> list[float]:
     """J for each step: in the capacitors when it should have begun, less those in them when it did.
 
-    0 where it did not begin late, or where the bus voltage was not recorded.
+    0 where it did not begin late, or where the voltage of the DC link was not recorded.
     """
     lost: list[float] = []
     due = math.inf

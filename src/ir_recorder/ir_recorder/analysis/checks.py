@@ -26,8 +26,8 @@ MODEL_PLANTS = ("", "nominal", "ideal")
 @dataclass(frozen=True)
 class Tolerances:
     """Bounds of the checks. The energy a movement may differ by is the larger of the relative and
-    the absolute one; what the capacitors held at its start, as the bus voltage shows, may be
-    missing besides.
+    the absolute one; what the capacitors held at its start, as the voltage of the DC link shows,
+    may be missing besides.
     """
 
     energy_relative: float = setting(

@@ -53,7 +53,7 @@ class EnergyFlows:
 
     @property
     def from_mains(self) -> float:
-        """What the rectifier feeds into the DC bus."""
+        """What the rectifier feeds into the DC link."""
         return self.mains - self.controller - self.tool - self.rectifier
 
     @property

@@ -77,7 +77,7 @@ class Meter:
         return self._between(self._rectifier, start, end)
 
     def joints(self, start: float, end: float) -> FloatArray:
-        """J per joint (n,) at the DC bus, signed."""
+        """J per joint (n,) at the DC link, signed."""
         return np.array([self._between(column, start, end) for column in self._joints.T])
 
     def peak(self, start: float, end: float) -> float:
@@ -86,9 +86,7 @@ class Meter:
         return float(self.power[inside].max()) if inside.any() else float("nan")
 
     def stored(self, time: float, link: DcLink) -> float:
-        """J in the capacitors of the DC link at a time, by the bus voltage; NaN where it wasn't
-        recorded.
-        """
+        """J in the capacitors of the DC link at a time, by its voltage; NaN where none is known."""
         volts = float(np.interp(time, self.time, self._volts))
         return (
             max(0.5 * link.capacitance * (volts**2 - link.voltage**2), 0.0)

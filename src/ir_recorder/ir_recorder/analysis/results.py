@@ -91,7 +91,7 @@ class StepResult:
 
     energy, base_energy, dissipated_energy, rectifier_energy [J]; straddling_energy [J]: by which
     energy may be wrong, as readings at its ends belong to other steps as well; joint_energy (n,)
-    [J] at the DC bus; peak_power [W];
+    [J] at the DC link; peak_power [W];
     indirect_energy [J]: from recorded positions alone; torque_energy [J]: from recorded speed and
     torque; second_opinion [J]: from positions with torques by Pinocchio, where it is installed;
     stored_energy [J]: in the capacitors at the start; lost_charge [J]: that the plan counted on in

@@ -58,7 +58,7 @@ class JointSeries(_ReadOnlyArrays):
 class PowerSeries(_ReadOnlyArrays):
     """The mains meter, N readings: mode and target numbers of ir_msgs/PowerMode; power, base_power,
     burnt_power (N,) W; energy (N,) J since the meter's start; bus_voltage (N,) V; joint_power (N,
-    n) W at the DC bus, joint_torque (N, n) Nm; tool_power (N,) W, part of base_power;
+    n) W at the DC link, joint_torque (N, n) Nm; tool_power (N,) W, part of base_power;
     rectifier_loss (N,) W; joint_temperature (N, n) deg C. What the plant doesn't have is NaN.
 
     A power is the mean since the reading before. heard (N,) [s]: when the recorder had each

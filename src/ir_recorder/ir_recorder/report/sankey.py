@@ -52,7 +52,7 @@ def sankey_section(analysis: Analysis) -> str:
         over += " as driven, its pauses shortened"
     hint = (
         f"Energy {over}, {watt_hours(flows.mains)} at the mains. Gross flows: axes that brake "
-        "return energy to the DC bus, masses that are lowered return it to the axes; both flow "
+        "return energy to the DC link, masses that are lowered return it to the axes; both flow "
         "back to the left."
     )
     if flows.split:
@@ -74,12 +74,12 @@ def rows(flows: EnergyFlows) -> list[tuple[str, str, float]]:
         ("mains", "controller and drives at rest", flows.controller),
         ("mains", "tool", flows.tool),
         ("mains", "rectifier loss", flows.rectifier),
-        ("mains", "DC bus", flows.from_mains),
-        ("DC bus", "axes", flows.taken),
-        ("DC bus", "brake resistor", flows.resistor),
-        ("DC bus", "capacitors", flows.stored),
-        *([("DC bus", "bleed resistors", flows.bled)] if flows.bled else []),
-        ("axes", "back to the DC bus", flows.returned),
+        ("mains", "DC link", flows.from_mains),
+        ("DC link", "axes", flows.taken),
+        ("DC link", "brake resistor", flows.resistor),
+        ("DC link", "capacitors", flows.stored),
+        *([("DC link", "bleed resistors", flows.bled)] if flows.bled else []),
+        ("axes", "back to the DC link", flows.returned),
     ]
     if flows.split:
         listed += [
@@ -140,7 +140,7 @@ def _graph(flows: EnergyFlows) -> tuple[dict[str, _Node], list[tuple[str, str, f
         "base": _Node("controller and drives at rest", "base", 1, flows.controller),
         "tool": _Node("tool", "tool", 1, flows.tool),
         "rectifier": _Node("rectifier loss", "dissipated", 1, flows.rectifier),
-        "bus": _Node("DC bus", "bus", 1, flows.from_mains + flows.returned),
+        "bus": _Node("DC link", "bus", 1, flows.from_mains + flows.returned),
         "resistor": _Node("brake resistor", "dissipated", 2, flows.resistor),
         "axes": _Node("axes", "axes", 2, flows.taken + lowered),
         "friction": _Node(

@@ -153,8 +153,8 @@ def _curves(analysis: Analysis) -> Iterator[Curves]:
         turning = Curves("torque", "Nm", joints.time, joints.effort, limits[2])
         yield from _with_rail(turning, rail, "force", "N")
     if power is not None:
-        drawn = Curves("power at the DC bus", "W", power.time, power.joint_power)
-        yield from _with_rail(drawn, rail, "power at the DC bus", "W")
+        drawn = Curves("power at the DC link", "W", power.time, power.joint_power)
+        yield from _with_rail(drawn, rail, "power at the DC link", "W")
     if controller is not None:
         error = controller.joint_error
         slides = int(bool(rail))

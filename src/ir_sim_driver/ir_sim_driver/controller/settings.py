@@ -40,7 +40,7 @@ class ControllerSettings:
     )
     regeneration: str = setting(
         "shared",
-        "What becomes of braking energy at the DC bus.",
+        "What becomes of braking energy at the DC link.",
         choices=REGENERATIONS,
         read_only=True,
     )
