@@ -16,6 +16,7 @@ from ir_msgs.msg import PowerState, Station, Status
 from ir_msgs.srv import GetTrajectory, SetCell
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.ros import client as client_module
+from ir_msgs_py.ros import rclpy_inside
 from ir_msgs_py.ros import spinning as spinning_module
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.ros.conversions import trajectory_to_msg
@@ -173,6 +174,62 @@ def test_a_call_that_is_given_up_ends_at_that_moment(client, cell, ros_executor)
         client.call("/silent", SetCell.Request(), timeout=PATIENCE, give_up=given_up)
     assert time.monotonic() - begun < 0.5 * PATIENCE
     go_on.set()
+
+
+def test_a_result_that_was_lost_is_asked_for_again(client, cell, monkeypatch):
+    """As where the client was suspended until the middleware had forgotten it."""
+    monkeypatch.setattr(client_module, "GONE", 1.0)  # looks more often
+    handle = cell.runner._handle
+    send = type(handle).send_result_response
+    lost = []
+
+    def lose(self, header, response):
+        if lost:
+            send(self, header, response)
+        else:
+            lost.append(response)
+
+    monkeypatch.setattr(type(handle), "send_result_response", lose)
+    result = client.send_goal("/ir_program_runner/run_program", RunProgram.Goal(program_id="short"))
+    assert lost
+    assert result == lost[0].result
+
+
+def test_a_goal_whose_answer_was_lost_is_canceled_by_its_id(client, cell, monkeypatch):
+    answer = rclpy_inside.GoalRequests.answer
+    client.send_goal("/ir_program_runner/run_program", RunProgram.Goal(program_id="short"))
+    monkeypatch.setattr(rclpy_inside.GoalRequests, "answer", lambda self, header, response: None)
+    monkeypatch.setattr(client, "timeout", 2.0)
+    with pytest.raises(CallTimedOutError, match="did not take the goal within 2 s"):
+        client.send_goal("/ir_program_runner/run_program", RunProgram.Goal(program_id="endless"))
+    assert cell.canceled.wait(PATIENCE)
+    monkeypatch.setattr(rclpy_inside.GoalRequests, "answer", answer)
+    client.send_goal("/ir_program_runner/run_program", RunProgram.Goal(program_id="short"))
+
+
+def test_a_goal_whose_node_was_started_anew_ends(client, cell, monkeypatch):
+    """The new one is there before the old one is forgotten, and does not know the goal."""
+    monkeypatch.setattr(client_module, "GONE", 1.0)  # looks more often
+    monkeypatch.setattr(client_module, "FORGOTTEN", 2.0)
+
+    def start_anew(at):
+        cell.runner._goal_handles.clear()
+
+    with pytest.raises(RequestRefusedError, match="does not know the goal any more"):
+        client.send_goal(
+            "/ir_program_runner/run_program", RunProgram.Goal(program_id="endless"), start_anew
+        )
+
+
+def test_a_goal_that_its_node_does_not_know_any_more_is_no_success(client, cell, monkeypatch):
+    def forget(self, taken):
+        self._goal_handles.clear()
+        return forgotten(self, taken)
+
+    forgotten = PatientActionServer._execute_get_result_request
+    monkeypatch.setattr(PatientActionServer, "_execute_get_result_request", forget)
+    with pytest.raises(RequestRefusedError, match="does not know the goal any more"):
+        client.send_goal("/ir_program_runner/run_program", RunProgram.Goal(program_id="endless"))
 
 
 def test_a_cancellation_calls_back_once_and_only_while_somebody_waits():

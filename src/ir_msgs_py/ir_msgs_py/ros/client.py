@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import rclpy
+from action_msgs.msg import GoalStatus
 from rclpy.action import ActionClient, get_action_names_and_types
 from rclpy.context import Context
 from rclpy.node import Node
@@ -40,6 +41,7 @@ from ir_msgs_py.ros.conversions import (
     trajectory_given,
     trajectory_to_msg,
 )
+from ir_msgs_py.ros.goal_clients import cancel_unanswered, new_goal_id
 from ir_msgs_py.ros.messages import owner_of, type_name
 from ir_msgs_py.ros.network import apply_network
 from ir_msgs_py.ros.plan_conversions import (
@@ -142,6 +144,20 @@ GONE = 10.0
 """s without anybody who offers an action before its goal is given up. The middleware forgets a
 process that died, or was stopped, after 5 s.
 """
+FORGOTTEN = 4.0
+"""s between two looks at an action's node, after which one may have forgotten the other."""
+_RARELY = 30.0  # s at most after which a goal's node is asked for the result again
+_ENDED = (GoalStatus.STATUS_SUCCEEDED, GoalStatus.STATUS_CANCELED, GoalStatus.STATUS_ABORTED)
+
+
+def _known_result(action: str, response: Any) -> Any:
+    """The result of a response; RequestRefusedError where the node does not know the goal."""
+    if response.status == GoalStatus.STATUS_UNKNOWN:
+        raise RequestRefusedError(
+            f"{action} does not know the goal any more: how it ended is not known",
+            int(StatusCode.FAILURE),
+        )
+    return response.result
 
 
 class GoalSender:
@@ -172,20 +188,23 @@ class GoalSender:
                 f"no node offers the action {action} (waited {response_timeout:g} s)"
             )
         on_feedback = None if feedback is None else lambda message: feedback(message.feedback)
+        goal_id = new_goal_id()
         sent: Future = self._executor.run(
-            lambda: client.send_goal_async(goal, feedback_callback=on_feedback)
+            lambda: client.send_goal_async(goal, feedback_callback=on_feedback, goal_uuid=goal_id)
         )
         if not self._executor.wait(sent, response_timeout):
+            self._executor.run(lambda: cancel_unanswered(client, goal_id, sent))
             raise CallTimedOutError(f"{action} did not take the goal within {response_timeout:g} s")
         handle = sent.result()
         if not handle.accepted:
             raise RequestRefusedError(f"{action} rejected the goal", int(StatusCode.FAILURE))
-        result: Future = self._executor.run(handle.get_result_async)
+        result = Future()
+        self._ask_for_result(handle, result)
         try:
             if self._has_ended(action, client, handle, result, result_timeout, give_up):
                 # feedback that came with the result is called back after it
                 self._executor.run(_nothing)
-                return result.result().result
+                return _known_result(action, result.result())
         except ServiceUnavailableError:  # nobody is there to cancel it
             raise
         except BaseException:  # Ctrl-C in a script must not leave the robot moving
@@ -220,12 +239,19 @@ class GoalSender:
         now = time.monotonic()
         deadline = now + timeout
         seen = now
+        patience = FORGOTTEN
+        asked = now
         while not self._executor.wait(result, min(0.1 * GONE, deadline - now), give_up):
             if give_up is not None and give_up.canceled:
                 self._executor.run(handle.cancel_goal_async)
                 give_up = None
             now = time.monotonic()
             if client.server_is_ready():
+                forgotten = now - seen >= FORGOTTEN
+                if forgotten or handle.status in _ENDED or now - asked >= patience:
+                    self._ask_for_result(handle, result)
+                    asked = now
+                    patience = min(2.0 * patience, _RARELY)
                 seen = now
             elif now - seen >= GONE:
                 raise ServiceUnavailableError(
@@ -234,6 +260,18 @@ class GoalSender:
             if now >= deadline:
                 return False
         return True
+
+    def _ask_for_result(self, handle: Any, result: Future) -> None:
+        """Ask for a goal's result, again where the answer may be lost: the middleware forgets this
+        process while it is suspended, and a node that was killed is followed by one that does not
+        know the goal. The first answer counts.
+        """
+
+        def take(answer: Future) -> None:
+            if not result.done():
+                result.set_result(answer.result())
+
+        self._executor.run(lambda: handle.get_result_async().add_done_callback(take))
 
     def _cancel(self, handle: Any, result: Future, grace: float) -> bool:
         """Whether the goal has ended within `grace` [s]."""

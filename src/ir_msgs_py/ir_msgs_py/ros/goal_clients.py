@@ -1,21 +1,46 @@
 """Clients of an action's goals: whether who has sent one is still there.
 
 A goal carries the participant of its sender, which is that of the sender's process. Whoever sends
-goals hears the answers to them, and so is in the graph as long as its process lives.
+goals hears the answers to them, and so is in the graph as long as its process lives. A sender whose
+goal is not answered cancels it by its id: it may be carried out all the same.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from uuid import uuid4
 
+from rclpy.action import ActionClient
+from rclpy.action.client import ClientGoalHandle
 from rclpy.node import Node
+from rclpy.task import Future
+from unique_identifier_msgs.msg import UUID
 
 _DISCOVERY = 10.0  # s in which the client of a goal shows in the graph, on a busy machine too
 _GRAPH_PERIOD = 0.2  # s between two looks who is there: each takes a millisecond
 _HELD_UP = 1.0  # s that count at most between two looks: who looks may have been held up itself
 
 Gone = Callable[[], bool]
+
+
+def new_goal_id() -> UUID:
+    """An id for a goal that is sent."""
+    return UUID(uuid=list(uuid4().bytes))
+
+
+def cancel_unanswered(client: ActionClient, goal_id: UUID, sent: Future) -> None:
+    """Cancel a goal whose answer has not come: its node may have taken it, or takes it later. To be
+    called on the thread that spins.
+    """
+    ClientGoalHandle(client, goal_id, None).cancel_goal_async()
+    sent.add_done_callback(_cancel_taken)
+
+
+def _cancel_taken(sent: Future) -> None:
+    handle = sent.result()
+    if handle is not None and handle.accepted:
+        handle.cancel_goal_async()
 
 
 class ClientWatch:

@@ -35,6 +35,7 @@ from ir_msgs_py.ros.conversions import (
     trajectory_from_msg,
     trajectory_to_msg,
 )
+from ir_msgs_py.ros.goal_clients import cancel_unanswered, new_goal_id
 from ir_msgs_py.ros.plan_conversions import planned_movement_from_msg
 from ir_msgs_py.ros.power_conversions import controller_timers_from_msg, power_mode_from_msg
 from ir_msgs_py.ros.topics import ACTION_SERVICES, LATCHED, SERVICE, LatestMessage
@@ -239,9 +240,10 @@ class DriverClient:
             station=station,
             states=list(states),
         )
-        sent: Future = self._execute.send_goal_async(goal)
+        goal_id = new_goal_id()
+        sent: Future = self._execute.send_goal_async(goal, goal_uuid=goal_id)
         if not await self._waiting.answer(sent, self._response_timeout):
-            sent.add_done_callback(_cancel_late)
+            cancel_unanswered(self._execute, goal_id, sent)
             return _timed_out(f"{self.name} did not take the trajectory", self._response_timeout)
         handle = sent.result()
         if not handle.accepted:
@@ -340,12 +342,6 @@ class DriverClient:
         self._time.hear(time_from_msg(reading.message.header.stamp), reading.age)
         if reading.message.mode != self._mode:
             self._mode = Mode(reading.message.mode)
-
-
-def _cancel_late(sent: Future) -> None:
-    handle = sent.result()
-    if handle is not None and handle.accepted:
-        handle.cancel_goal_async()
 
 
 def _status_of(response: Any) -> Status:
