@@ -60,16 +60,20 @@ QUARTER = 900.0  # s: over which suppliers measure demand
 
 def largest_quarter(seconds: FloatArray, joules: FloatArray) -> float:
     """The largest mean power [W] of a quarter of an hour of a cycle that is repeated: stretches
-    (N,) of so many seconds, in their order, each at its mean power.
+    (N,) of so many seconds, in their order, each at its mean power; 0 of a cycle without duration.
     """
-    repeated = 2 + int(QUARTER / seconds.sum())
-    ends = np.concatenate(([0.0], np.cumsum(np.tile(seconds, repeated))))
-    energy = np.concatenate(([0.0], np.cumsum(np.tile(joules, repeated))))
+    cycle = seconds.sum()
+    if cycle <= 0.0:
+        return 0.0
+    whole = QUARTER // cycle  # cycles that lie in every quarter; the rest of it lies where it costs
+    rest = QUARTER - whole * cycle
+    ends = np.concatenate(([0.0], np.cumsum(np.tile(seconds, 2))))
+    energy = np.concatenate(([0.0], np.cumsum(np.tile(joules, 2))))
     # the largest window begins or ends where a step does
-    starts = np.concatenate((ends, ends - QUARTER))
-    starts = starts[(starts >= 0.0) & (starts <= ends[-1] - QUARTER)]
-    found = np.interp(starts + QUARTER, ends, energy) - np.interp(starts, ends, energy)
-    return float(found.max() / QUARTER)
+    starts = np.concatenate((ends, ends - rest))
+    starts = starts[(starts >= 0.0) & (starts <= ends[-1] - rest)]
+    found = np.interp(starts + rest, ends, energy) - np.interp(starts, ends, energy)
+    return float((whole * joules.sum() + found.max()) / QUARTER)
 
 
 @dataclass(frozen=True)
