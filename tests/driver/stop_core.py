@@ -148,10 +148,9 @@ class Core:
         return True
 
     def end_rest(self) -> None:
-        """The program runner leaves a rest on brakes."""
-        if self.on_the_network:
-            with suppress(RequestRefusedError):
-                self.control.end_rest(TOPIC)
+        """The program runner leaves a rest on brakes, on the network."""
+        with suppress(RequestRefusedError):
+            self.control.end_rest(TOPIC)
 
     def key(self) -> tuple[Any, ...]:
         """All that decides what may happen next, without what only counts."""

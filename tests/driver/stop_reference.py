@@ -91,6 +91,11 @@ class Reference:
         """What the table says."""
         return self._happens("recover")
 
+    def end_rest(self) -> None:
+        """A program takes its drives_off back; refused while a stop is latched."""
+        if self.state == "run":
+            self.write({"drives_off": False})
+
     def woken(self) -> None:
         """The controller has started again: levels are what they are, nothing rises."""
         for signal in self.signals.values():

@@ -50,6 +50,12 @@ class Pair:
             self.core.recover()
             self.reference.recover()
 
+    def end_rest(self) -> None:
+        """The program runner leaves a rest on brakes."""
+        if self.core.on_the_network:
+            self.core.end_rest()
+            self.reference.end_rest()
+
     def wait(self, milliseconds: int) -> None:
         for _ in range(milliseconds):
             self.pass_time(1)
@@ -106,7 +112,7 @@ def drawn(steps: int, seed: int) -> str:
         pair.wait(21)
         pair.pass_time(generator.choice((500, 1_000, 3_000, 25_000, 130_000)))
 
-    actions = (write, pair.fault, pair.recover, send, pair.core.end_rest, wake, leap)
+    actions = (write, pair.fault, pair.recover, send, pair.end_rest, wake, leap)
     weights = (70, 3, 5, 6, 3, 7, 5)
     for step in range(steps):
         generator.choices(actions, weights)[0]()
@@ -230,7 +236,7 @@ def _program_drives(world: World) -> str:
 def _program_ends_rest(world: World) -> str:
     before = world.pair.core.plc.stop.state
     if world.program is not None:
-        world.pair.core.end_rest()
+        world.pair.end_rest()
     recovered = before is not StopState.RUN and not world.pair.core.plc.stop.stopped
     return "a program recovers" if recovered else ""
 
@@ -413,6 +419,14 @@ def test_a_program_s_wish_to_leave_its_rest_never_recovers() -> None:
     pair.wait(1000)
     assert pair.core.plc.stop.state is StopState.ACKNOWLEDGED
     assert pair.core.mode is Mode.EMERGENCY_STOP
+
+
+def test_what_a_program_has_taken_back_hinders_no_recovery() -> None:
+    world = _after(STARTS["on brakes"](), "program starts", "program ends its rest", "21 ms")
+    for name in ("emergency_stop", "emergency_stop", "conf_mess", "drives_on", "21 ms"):
+        assert EVENTS[name](world) == ""
+        assert world.pair.difference() == ""
+    assert world.pair.core.plc.stop.state is StopState.RUN
 
 
 def test_a_wish_to_leave_a_rest_is_void_after_a_stop() -> None:
