@@ -53,6 +53,12 @@ def test_a_wrong_table_is_refused_with_its_place(wrong: tuple[str, str], sentenc
     assert sentence in str(error.value)
 
 
+def test_a_mode_that_the_function_block_has_no_time_for_is_refused() -> None:
+    planned = PlcPause(3, "home", 420.0, ("STAND_ON_BRAKES", "NAP"), (0.0, 1.3), 400.0)
+    with pytest.raises(KrlError, match="pause 3: a PLC's program has no time for NAP"):
+        structured_text("MAIN", [planned], NUMBERS, [])
+
+
 # Structured text as Python: assignments, IF, CASE and two timers are all that it has.
 
 

@@ -252,7 +252,13 @@ def structured_text(
 
 
 def _case(pause: PlcPause) -> str:
+    """The branch of a pause. Raises KrlError for a mode that the function block doesn't know."""
     at = dict(zip(pause.modes, pause.asked_at, strict=True))
+    unknown = [mode for mode in at if mode not in _BITS]
+    if unknown:
+        raise KrlError(
+            f"pause {pause.number}: a PLC's program has no time for {', '.join(unknown)}"
+        )
     brakes, bus, hibernate = (at.get(mode, -1.0) for mode in _BITS)
     return (
         f"  {pause.number}: (* at {pause.place or 'where the robot stands'}: {pause.sentence} *)\n"
