@@ -12,7 +12,7 @@ from itertools import accumulate
 import numpy as np
 
 from ir_msgs_py.announcements import Event
-from ir_msgs_py.modes import Mode, TransitionTimes
+from ir_msgs_py.modes import REST_OF_BIT, Mode, TransitionTimes
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
 from ir_msgs_py.plc import Signal
 from ir_msgs_py.report import MovementKind, PlannedMovement
@@ -217,7 +217,7 @@ class Program:
             sentence = f"the power mode is {mode}: a program starts in {known}"
             raise StepFailedError(Status(StatusCode.INVALID_ROBOT_STATE, sentence))
         need(outcome)
-        for bit in ("ab", "hib"):
+        for bit in REST_OF_BIT:
             need((yield TakeBack(bit)))
 
     def _step(

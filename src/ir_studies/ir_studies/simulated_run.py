@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from ir_description import Cell
-from ir_msgs_py.modes import Mode
+from ir_msgs_py.modes import RESTS, Mode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_recorder.traces import Trace
 from ir_sim_driver import DriverError, ErrorCode, TrajectoryGoal, make_simulation
@@ -24,7 +24,7 @@ _CHANGE = 600.0  # s until a mode must have come
 # s between looks at the capacitor, and until it counts as empty
 _REST = 0.5
 _LONGEST_REST = 20.0
-_BITS = {Mode.STAND_ON_BRAKES: "drives_off", Mode.BUS_POWER_OFF: "ab", Mode.HIBERNATION: "hib"}
+_BITS = {row.mode: row.bit or "drives_off" for row in RESTS}
 
 
 class Step(Protocol):

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ir_msgs_py.modes import REST_MODES, Mode
 from ir_recorder.analysis.results import mode_name
 from ir_recorder.analysis.tending import Span
 from ir_recorder.reading.recording import PowerSeries
@@ -67,7 +68,7 @@ def together(meters: Sequence[PowerSeries]) -> tuple[FloatArray, FloatArray]:
     return time, np.sum([np.interp(time, m.time, m.power) for m in meters], axis=0)
 
 
-_MODES = ("MOVING", "STAND_ON_MOTORS", "STAND_ON_BRAKES", "BUS_POWER_OFF", "HIBERNATION")
+_MODES = (Mode.MOVING.name, *REST_MODES)
 
 
 def legend(kinds: Mapping[str, str]) -> str:

@@ -10,7 +10,7 @@ from ir_msgs_py.status import StatusCode
 from ir_msgs_py.stop_numbers import stop_count
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.errors import RequestRefusedError
-from ir_sim_driver.plc import OFF_BIT, Plc
+from ir_sim_driver.plc import OFF_BIT, POWER_BITS, Plc
 from ir_sim_driver.power import (
     PAUSE_MAX,
     Charging,
@@ -187,7 +187,7 @@ class Pauses:
         mode = self._modes.mode
         if plc.operating_mode is not OperatingMode.EXT:
             return f"operating mode is {plc.operating_mode.name}, must be EXT"
-        if plc.levels.ab or plc.levels.hib or plc.levels.ks:
+        if any(getattr(plc.levels, bit) for bit in POWER_BITS):
             return "a power bit of the PLC is 1: PROFIenergy and AB, HIB, KS exclude each other"
         if executing:
             return "the robot is executing a trajectory"
@@ -332,7 +332,7 @@ class ModeControl:
         if self.modes.target in OFF_THE_NETWORK and self.modes.target in ROW:
             seconds = self.modes.time_to_target
             return f"the controller falls asleep in {seconds:.3g} s: wake it by Wake-on-LAN then"
-        if plc.rest is not None or plc.raw.ab or plc.raw.hib or plc.raw.ks:
+        if plc.rest is not None or any(getattr(plc.raw, bit) for bit in POWER_BITS):
             return "a power bit of the PLC is 1: clear AB, HIB and KS"
         if self.latches.drives_off or plc.raw.drives_off:
             return "drives_off was given, drives_on is needed"

@@ -5,6 +5,7 @@ by.
 from ir_sim_driver.plc.inputs import (
     OFF_BIT,
     OWN_BITS,
+    POWER_BITS,
     Plc,
     PlcSettings,
     Watchdog,
@@ -19,6 +20,7 @@ __all__ = [
     "LINKS",
     "OFF_BIT",
     "OWN_BITS",
+    "POWER_BITS",
     "SERVICE",
     "STOP_BIT",
     "TOPIC",

@@ -62,7 +62,7 @@ HIBERNATION_BIT = ROW[Mode.HIBERNATION].bit
 POWER_BITS = (*REST_OF_BIT, RESTART_BIT)
 BITS = tuple(name for name in PLC_INPUT_NAMES if name not in OperatingMode.__members__)
 OFF_BIT = "drives_off"
-OWN_BITS = ("ab", "hib", OFF_BIT)
+OWN_BITS = (*REST_OF_BIT, OFF_BIT)
 """Those that a program gives in a pause, and takes back."""
 
 
