@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ir_description import load_cell, load_power_data
-from ir_msgs_py.modes import TransitionTimes
+from ir_msgs_py.modes import REST_MODES, RestTimes, TransitionTimes, shortest_pause
 from ir_planner.errors import RequestError
 from ir_planner.program.pause_lengths import lengths_of
-from ir_planner.program.rests import mode_watts, rests_at
+from ir_planner.program.rests import Rest, Rests, mode_watts, rests_at
 from ir_planner.program.standby import break_even, plan_standby
 from ir_planner.scene.planning_scene import load_text, scene_with
 from ir_planner.waiting_postures import Trip, best_posture
@@ -42,6 +42,39 @@ def test_the_modes_draw_what_table_2_says(payload: float) -> None:
 def test_break_even_with_the_tool_alone_is_that_of_the_data() -> None:
     assert break_even("BUS_POWER_OFF", HOME, SCENE, TIMES) == pytest.approx(99.8, abs=0.1)
     assert break_even("HIBERNATION", HOME, SCENE, TIMES) == pytest.approx(1012.1, abs=0.1)
+
+
+HUNDREDTHS = st.integers(0, 2_000).map(lambda count: count / 100.0)  # s, as users write them
+
+
+@given(HUNDREDTHS, HUNDREDTHS, HUNDREDTHS, st.sampled_from((3, 2)))
+@settings(deadline=None, max_examples=200)
+def test_a_pause_as_long_as_its_modes_need_can_be_spent_in_them(
+    enter: float, stay: float, leave: float, count: int
+) -> None:
+    """By the planner's choice, by what is sent, and by the driver's."""
+    times = RestTimes(enter, stay, leave)
+    modes = tuple(Rest(name, 10.0, times, bus_off=True) for name in REST_MODES[1 : 1 + count])
+    rests = Rests(1000.0, 1e9, modes)
+    for chosen in (modes[-1:], modes):
+        pause = shortest_pause([each.times for each in chosen])
+        assert rests.in_time(chosen, pause) < np.inf
+        longer = rests.in_time(chosen, pause + 1e-6)
+        assert rests.in_time(chosen, pause) == pytest.approx(longer, abs=1e-4)  # at 10 W
+        assert rests.in_time(chosen, pause - 1e-3) == np.inf
+
+
+def test_a_controller_without_brakes_to_close_keeps_its_motors_on() -> None:
+    bare = replace(
+        POWER,
+        modes=tuple(mode for mode in POWER.modes if mode.name != "STAND_ON_BRAKES"),
+        table_2=(),
+    )
+    scene = scene_with(CELL, load_text(CELL), bare)
+    for pause in (1.0, 60.0, 90.0, 3600.0):
+        standby = plan_standby(pause, HOME, scene, TIMES)
+        assert "STAND_ON_BRAKES" not in standby.modes
+        assert standby.energy <= min(standby.energies)
 
 
 def test_times_default_to_those_of_the_controllers_data() -> None:

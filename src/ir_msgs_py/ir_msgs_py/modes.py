@@ -167,6 +167,12 @@ def shortest_pause(rests: Sequence[RestTimes]) -> float:
     return sum(rest.busy for rest in rests) + rests[-1].leave if rests else 0.0
 
 
+PAUSE_ROUNDING = 1e-6
+"""s by which a pause may be shorter than its modes take, for the rounding of sums: one that is
+exactly as long as they need can be spent in them.
+"""
+
+
 # Cost of a power mode in the terms of PROFIenergy, and the reading of the mains meter.
 
 

@@ -5,7 +5,7 @@ from itertools import accumulate
 
 import numpy as np
 
-from ir_msgs_py.modes import DEEPER, TransitionTimes, modes_of, shortest_pause
+from ir_msgs_py.modes import DEEPER, PAUSE_ROUNDING, TransitionTimes, modes_of, shortest_pause
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_planner.checks import MovementEnergy, carried, holding_watts, peak_power
 from ir_planner.program.rests import BRAKES, MOTORS, Recharge, Rests, at_once, cut_at, rests_at
@@ -13,7 +13,6 @@ from ir_planner.scene import PlanningScene
 from ir_values.arrays import FloatArray
 
 AUTO = "AUTO"
-_EXACTLY = 1e-9  # s: a pause may be as long as its modes need
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +59,7 @@ def switch_times(
     """
     names = [each.name for each in modes_of(mode)]
     rests = [times.rest(name) for name in names]
-    if not rests or seconds < shortest_pause(rests) - _EXACTLY:
+    if not rests or seconds < shortest_pause(rests) - PAUSE_ROUNDING:
         return (), seconds
     asked_at = accumulate((rest.busy for rest in rests[:-1]), initial=0.0)
     return tuple(zip(names, asked_at, strict=True)), rests[-1].wake_at(seconds)

@@ -18,7 +18,13 @@ from typing import TypeVar
 
 import numpy as np
 
-from ir_msgs_py.modes import REST_MODES, RestTimes, TransitionTimes, drive_bus_up
+from ir_msgs_py.modes import (
+    PAUSE_ROUNDING,
+    REST_MODES,
+    RestTimes,
+    TransitionTimes,
+    drive_bus_up,
+)
 from ir_planner.checks import holding_slope, holding_watts, standing_slope
 from ir_planner.scene import PlanningScene
 from ir_values.arrays import BoolArray, FloatArray
@@ -98,6 +104,11 @@ class Rests:
     modes: tuple[Rest, ...]
     recharge: Recharge = Recharge()
 
+    @property
+    def closes_brakes(self) -> bool:
+        """Whether the controller closes the brakes by itself: it has a mode on them."""
+        return any(rest.name == BRAKES for rest in self.modes)
+
     def named(self, name: str) -> Rest:
         """The mode of that name."""
         return next(rest for rest in self.modes if rest.name == name)
@@ -128,8 +139,11 @@ class Rests:
         short.
         """
         steps = at_once(rests)
-        awake = steps[-1].rest.times.wake_at(pause)
-        return self._energy(steps, awake) if awake >= steps[-1].free else float("inf")
+        last = steps[-1]
+        awake = last.rest.times.wake_at(pause)
+        if awake < last.free - PAUSE_ROUNDING:
+            return float("inf")
+        return self._energy(steps, max(awake, last.free))
 
     def _energy(self, steps: Steps, awake: _Seconds) -> _Seconds:
         """Energy [J] from motors through the steps, woken at a time [s], until the robot is
@@ -188,7 +202,7 @@ class Rests:
         """The steps with the brakes that the controller closes by itself."""
         if steps and steps[0].at <= self.timer:
             return steps
-        if not self.modes:  # nothing to rest in: motors stay on
+        if not self.closes_brakes:
             return steps
         brakes = RestStep(self.named(BRAKES), self.timer)
         return (

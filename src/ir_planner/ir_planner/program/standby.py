@@ -224,7 +224,7 @@ def _alone(rests: Rests, lengths: PauseLengths, by_itself: float) -> tuple[float
 def _shown(rests: Rests, steps: Steps, most: float) -> tuple[tuple[str, ...], tuple[float, ...]]:
     """Names and switch times [s] of a sequence, from the mode that the pause begins in."""
     if not steps or steps[0].at > 0.0:
-        closed = not steps and rests.modes and most > rests.timer
+        closed = not steps and rests.closes_brakes and most > rests.timer
         brakes = (RestStep(rests.named(BRAKES), rests.timer),) if closed else ()
         shown = (*steps, *brakes)
         return (MOTORS, *(step.rest.name for step in shown)), (0.0, *(step.at for step in shown))

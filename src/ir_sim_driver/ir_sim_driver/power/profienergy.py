@@ -15,9 +15,8 @@ from dataclasses import replace
 from itertools import pairwise
 
 from ir_description.robot import DcLink
-from ir_msgs_py.modes import DRIVES_ON, ROW, Mode, PowerMode, RestTimes
+from ir_msgs_py.modes import DRIVES_ON, PAUSE_ROUNDING, ROW, Mode, PowerMode, RestTimes
 
-_ROUNDING = 1e-6  # s; a pause may be just as long as a sequence
 _ROUNDS = 50  # of a break-even whose cost depends on it
 PAUSE_MAX = 604_800.0  # s: a week
 
@@ -122,7 +121,7 @@ def best_route(
             if since is not None:
                 woken = pause - modes[-1].regular_time_to_operate
                 energy += charging(max(woken - since, 0.0))
-            if left >= -_ROUNDING and energy < best:
+            if left >= -PAUSE_ROUNDING and energy < best:
                 best = energy
                 route = modes
     return route
