@@ -671,6 +671,8 @@ class PatientActionServer(ActionServer):
                 await super()._execute_goal_request(goal)
             except Exception as failure:  # the next goal has nobody else
                 failures.append(failure)
+        if len(failures) > 1:
+            raise ExceptionGroup("goals of one client", failures)
         if failures:
             raise failures[0]
 

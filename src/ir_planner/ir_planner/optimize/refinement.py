@@ -8,7 +8,8 @@ clearance is proved; a pair that comes too near gets a larger clearance margin, 
 continues.
 """
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -20,7 +21,6 @@ from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.checks import TILT, Violation
 from ir_planner.curves import UniformSpline, along_motion, along_path, fewest_seconds
 from ir_planner.optimize.spline_cost import beyond_limits, slowed_to_limits, spline_cost
-from ir_planner.optimize.within_duration import within_duration
 from ir_planner.request import Context
 from ir_planner.scene import PROOF_TOLERANCE, MotionLimits, tcp_inside
 from ir_planner.search import at_nine_shares
@@ -177,6 +177,48 @@ class Solution:
     def places(self) -> FloatArray:
         """Configurations (9, n) by which coarse solutions are compared."""
         return at_nine_shares(self.spline.control)
+
+
+# Little energy in a requested duration that leaves hardly any time.
+#
+# A descent at such a duration ends beyond the limits. A descent of free duration ends within them,
+# because its result is slowed until they hold. So the duration is left free and its price lowered:
+# from the fastest movement on, a second is worth less from step to step, until the movement takes
+# all of the time that was requested.
+
+Near = Callable[[Movement, Context], Movement | None]  # by descent from a known movement
+_FIRST = 32.0  # times the robot's own price of a second, at first
+_STEP = 4.0  # by so much less, or more, from step to step
+_DESCENTS = 5
+_ENOUGH = 0.985  # of the duration: slower would save little more than stretching does
+
+
+def within_duration(fastest: Movement, context: Context, near: Near) -> Movement | None:
+    """The cheapest movement found of the duration that the context requests, None where none is
+    certified; fastest: one that takes at most as long.
+    """
+    requested = context.options.duration
+    best = None
+    nearest = fastest
+    value = _FIRST * context.scene.cell.robot.time_value
+    late = 0.0
+    early = 0.0
+    for _ in range(_DESCENTS):
+        priced = replace(context.asking("time_and_energy").options, time_value=value)
+        movement = near(nearest, replace(context, options=priced))
+        duration = movement.trajectory.duration if movement is not None else float("inf")
+        if movement is None or duration > requested * (1.0 + DURATION_SLACK):
+            late = value
+        else:
+            nearest = movement
+            early = value
+            slower = replace(movement, context=context).stretched_by(max(requested / duration, 1.0))
+            if slower.prove().certified and (best is None or slower.cost < best.cost):
+                best = slower
+            if duration > _ENOUGH * requested:
+                break
+        value = math.sqrt(late * early) if late and early else (_STEP * late or early / _STEP)
+    return best
 
 
 class Refinement:

@@ -110,11 +110,8 @@ def drive_sheet(text: str, source: str, arm: UrdfArm) -> DriveSheet:
     """Read a sheet for an arm, and estimate what it does not know. Raises RobotFileError."""
     top = read_items(text, source, RobotFileError).table(_KEYS, _OPTIONAL)
     top["format"].choice((SHEET_FORMAT,))
-    known = {
-        key: value
-        for key, (unit, low) in _ROWS.items()
-        if (value := _given_values(top, key, unit, low))
-    }
+    given = {key: _given_values(top, key, unit, low) for key, (unit, low) in _ROWS.items()}
+    known = {key: values for key, values in given.items() if values is not None}
     known["rated_payload_kg"] = _value(
         top["rated_payload_kg"], lambda item: item.number(0, 1e4, "kg", above=True)
     )
