@@ -99,14 +99,17 @@ class RecordingSession:
 
     def message(self, topic: str, data: bytes, time: int) -> None:
         """Appends a message of an open topic, received at `time` [ns]."""
-        due = self._split.due(self._writer.size, (time - self._begun) * 1e-9)
-        if due and not (self.blocked and time < self._next_try):
+        if self._split.wanted and time >= self._next_try and self._is_due(time):
             self._next_file(time)
         self._writer.write(self._channels[topic], time, data)
         self._latched.keep(topic, data)
         first, last = self._span if self._messages else (time, time)
         self._span = min(first, time), max(last, time)
         self._messages += 1
+
+    def _is_due(self, time: int) -> bool:
+        """Whether the file is long enough at `time` [ns]."""
+        return self._split.due(self._writer.size, (time - self._begun) * 1e-9)
 
     def attach_cell(self, files: CellFiles, time: int) -> None:
         """Puts cell, URDF and the data of robot and controller beside the messages, once."""
