@@ -378,12 +378,14 @@ def origin_of(cycle: Production) -> str:
     return f"{cycle.origin}, {computed}" if computed else cycle.origin
 
 
-def driven_name(cycle: Production) -> str:
-    """What a year of a cycle that was driven is called; its full pauses are named, where nobody
-    drove them.
-    """
+DRIVEN = "as driven"
+"""What a year of a cycle that was driven is called."""
+
+
+def driven_detail(cycle: Production) -> str:
+    """What such a year is of; its full pauses are named, where nobody drove them."""
     pauses = "" if cycle.computed is None else ", full pauses computed"
-    return f"as driven, {cycle.origin}{pauses}"
+    return f"{cycle.origin}{pauses}"
 
 
 def own_pace(cycle: Production | None) -> str:

@@ -81,7 +81,9 @@ from ir_recorder.report.page import PAGE_START, folded
 from ir_recorder.report.paid import (
     ABOVE,
     ABOVE_LEAST,
+    Before,
     Paid,
+    RunNow,
     Tile,
     a_night,
     at_night,
@@ -756,13 +758,13 @@ def _paid(members: Sequence[Member], costs: Costs) -> Paid:
     common = sum(robot.before for robot in robots)
     driven = [robot.reached for robot in robots if robot.reached is not None]
     of += f"; today: {_as_now(robots)}" if driven else ""
-    now = ("today", sum_of([robot.now for robot in robots]).value)
+    now = RunNow("today", sum_of([robot.now for robot in robots]).value)
     return Paid(
         saved,
         common,
         idle,
         of,
-        f"{COMMON}s",
+        Before.COMMONS,
         now if driven else None,
         run=_computed(members),
         reached=sum_of(driven) if driven else None,

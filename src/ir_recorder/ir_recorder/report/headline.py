@@ -27,13 +27,14 @@ from ir_recorder.reading.recording import Recording
 from ir_recorder.report.answer import Answer
 from ir_recorder.report.costs import (
     COMMON,
+    DRIVEN,
     PLANNED,
     Costs,
     IdleSaving,
     computed_words,
     cycles_of_year,
     demand_note,
-    driven_name,
+    driven_detail,
     money_of_thousand,
     origin_of,
     recorded_demand,
@@ -58,7 +59,9 @@ from ir_recorder.report.number_text import (
 from ir_recorder.report.paid import (
     MOVEMENTS,
     PAUSES,
+    Before,
     Paid,
+    RunNow,
     Tile,
     a_night,
     between_of,
@@ -344,8 +347,10 @@ def _paid(analysis: Analysis, costs: Costs) -> Paid:
     saved = costs.saving_of_year(cycle) if cycle is not None else None
     driven = None
     if cycle is not None:
-        name = PLANNED if analysis.program is None else driven_name(cycle)
-        driven = (name, costs.energy_of_year(cycle).value)
+        energy = costs.energy_of_year(cycle).value
+        driven = RunNow(PLANNED, energy, is_planned=True)
+        if analysis.program is not None:
+            driven = RunNow(DRIVEN, energy, driven_detail(cycle))
     if cycle is None or cycle.savings is None or saved is None:
         counted = "" if cycle is None else f", {cycles_of_year(cycle.pace, costs)}"
         return Paid(None, 0.0, idle, counted, driven=driven)
@@ -359,8 +364,11 @@ def _paid(analysis: Analysis, costs: Costs) -> Paid:
     else:
         driven = None
     proved = analysis.recording.only_planned and analysis.recording.planned_certified
-    reached = reached_saving(saved, common, driven[1]) if driven is not None else None
-    return Paid(saved, common, idle, said, COMMON, driven, cycle.supply, proved, run, more, reached)
+    reached = reached_saving(saved, common, driven.energy) if driven is not None else None
+    return Paid(
+        *(saved, common, idle, said, Before.COMMON, driven, cycle.supply, proved, run, more),
+        reached=reached,
+    )
 
 
 def _of_run(analysis: Analysis, cycle: Production) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 
 from ir_recorder.analysis.production import Amount
 from ir_recorder.report.answer import Answer
@@ -19,7 +20,6 @@ from ir_recorder.report.costs import (
     Costs,
     IdleSaving,
     SavedYear,
-    money_of_thousand,
     payback,
     saved_year,
 )
@@ -28,6 +28,7 @@ from ir_recorder.report.money_text import (
     adding_up,
     groups_adding_up,
     larger_end,
+    money,
     money_of,
     price_field,
     yearly_money,
@@ -67,23 +68,44 @@ ABOVE_LEAST = 0.01  # of the common program: less is nothing to look for
 _COMMON = " Common program: the same stations by PTP at 100 %, its pauses left to the controller."
 
 
+class Before(StrEnum):
+    """What a plan is held against, by its name on a page: today's program, or what stands for it,
+    of one robot or of several.
+    """
+
+    TODAY = TODAY
+    COMMON = COMMON
+    COMMONS = f"{COMMON}s"
+
+
+@dataclass(frozen=True)
+class RunNow:
+    """What runs now: its name on a page, and what a year of it takes [J]; detail: what else its row
+    says. is_planned: a plan, which nobody drove.
+    """
+
+    name: str
+    energy: float
+    detail: str = ""
+    is_planned: bool = False
+
+
 @dataclass(frozen=True)
 class Paid:
     """What those who pay ask first. saved [J] a year by the plan, of `common` [J]; None where it is
     not known; idle: outside of the shifts. counted: what the year is
-    made of, in words; before: what it is held against. driven: what else a year of it is called,
-    and what that takes [J]: nothing is known of its nights, so they are as before. supply: what
-    limits the figures. proved: whether the planned program is certified. run: what was driven, in
-    a sentence. more: what else the plan gains. reached [J]: how much less than `common` was driven
-    (`reached_saving`); None where nothing was.
+    made of, in words; before: what it is held against. driven: what runs now: nothing is known of
+    its nights, so they are as before. supply: what limits the figures. proved: whether the planned
+    program is certified. run: what was driven, in a sentence. more: what else the plan gains.
+    reached [J]: how much less than `common` was driven (`reached_saving`); None where nothing was.
     """
 
     saved: Amount | None
     common: float
     idle: IdleSaving | None
     counted: str = ""
-    before: str = TODAY
-    driven: tuple[str, float] | None = None
+    before: Before = Before.TODAY
+    driven: RunNow | None = None
     supply: str = ""
     proved: bool = False
     run: str = ""
@@ -97,7 +119,7 @@ class Paid:
         [J]: what a part took and takes then.
         """
         year = self.year(costs)
-        less = "less" if year.money.gain()[0] == "saved" else "more"
+        less = _less(year.money)
         energy = year.with_energy(costs)
         share = self.share_words(costs)
         said = (share, f"{energy} {less}" if energy else "", payback(year.money, costs), self.more)
@@ -140,17 +162,17 @@ class Paid:
         """Money of a year that a run took more than its plan; 0 where nothing was driven."""
         if self.driven is None or self.saved is None:
             return 0.0
-        return costs.money(self.driven[1] - (self.common - self.saved.value))
+        return costs.money(self.driven.energy - (self.common - self.saved.value))
 
     def share_words(self, costs: Costs) -> str:
         """How much less a year of the plan takes than what it is held against: "57.8 % less than
         the common program".
         """
-        word, gain = self.year(costs).money.gain()
-        less = "less" if word == "saved" else "more"
+        money = self.year(costs).money
+        _, gain = money.gain()
         all_of_it = "with all of it " if self.has_reached is not None else ""
         share = percent_of(gain.value, sum(self.before_amounts(costs)))
-        return f"{all_of_it}{share} {less} than {_with_article(self.before)}"
+        return f"{all_of_it}{share} {_less(money)} than {_with_article(self.before)}"
 
     def bills(self, costs: Costs) -> list[tuple[str, str]]:
         """What a year costs, nights with it: of what the plan is held against, of what was driven,
@@ -159,10 +181,9 @@ class Paid:
         if self.saved is None or self.common <= 0.0:
             return []
         before = self.before_amounts(costs)
-        found = [(self.before, sum(before))]
+        found = [(str(self.before), sum(before))]
         if self.driven is not None:
-            name, energy = self.driven
-            found.append((name.partition(",")[0], costs.money(energy) + before[1]))
+            found.append((self.driven.name, costs.money(self.driven.energy) + before[1]))
         found.append((planned_name(self.before), sum(self._then(costs))))
         return [(name, f"{yearly_money(each, costs.currency)} a year") for name, each in found]
 
@@ -232,7 +253,7 @@ class Paid:
         pale = " Pale: at night and at weekends." if self.idle is not None else ""
         spread = any(row.whisker[0] < row.whisker[1] for row in rows)
         whisker = " Whisker: 90 % interval." if spread else ""
-        common = _COMMON if self.before.startswith(COMMON) else ""
+        common = "" if self.before is Before.TODAY else _COMMON
         hint = f"In full colour: in shifts{self.counted}.{pale}{whisker}{common}"
         return (
             f'<section id="year"><h2>Energy costs of a year</h2>'
@@ -248,9 +269,8 @@ class Paid:
         then = self._then(costs)
         rows = [_year_row(self.before, "today", before, costs, ON_BRAKES)]
         if self.driven is not None:
-            name, energy = self.driven
-            now = costs.money(energy), before[1]
-            rows.append(_year_row(name, "driven", now, costs, ON_BRAKES))
+            now = costs.money(self.driven.energy), before[1]
+            rows.append(_year_row(_row_name(self.driven), "driven", now, costs, ON_BRAKES))
         mode = "" if self.idle is None else f"in {self.idle.mode}"
         rows.append(_year_row(planned_name(self.before), "planned", then, costs, mode))
         saved = self.year(costs).money
@@ -271,10 +291,10 @@ class Paid:
         """A year of what was driven or planned, and what rest would save of it."""
         if self.driven is None or self.idle is None:
             return []
-        name, energy = self.driven
         idle = self.idle
-        shifts = costs.money(energy)
-        style = "today" if name == PLANNED else "driven"
+        name = _row_name(self.driven)
+        shifts = costs.money(self.driven.energy)
+        style = "today" if self.driven.is_planned else "driven"
         how = f"in {idle.mode}"
         return [
             _year_row(name, style, (shifts, idle.left_alone), costs, ON_BRAKES),
@@ -287,14 +307,24 @@ class Paid:
         return saved_year(self.saved or Amount(0.0, 0.0, 0.0), self.idle, costs)
 
 
-def _with_article(before: str) -> str:
+def _less(money: Amount) -> str:
+    """Whether a plan takes less or more, of what it saves."""
+    return "less" if money.value >= 0.0 else "more"
+
+
+def _row_name(now: RunNow) -> str:
+    """What runs now, as its row is called."""
+    return f"{now.name}, {now.detail}" if now.detail else now.name
+
+
+def _with_article(before: Before) -> str:
     """What a plan is held against, in a sentence: today's program has its own word before it."""
-    return before if before == TODAY else f"the {before}"
+    return before if before is Before.TODAY else f"the {before}"
 
 
-def planned_name(before: str) -> str:
+def planned_name(before: Before) -> str:
     """What a year of the plan is called beside what it is held against."""
-    return f"{PLANNED}s" if before.endswith("programs") else PLANNED
+    return f"{PLANNED}s" if before is Before.COMMONS else PLANNED
 
 
 KEEP = "Keep the program as it is."
@@ -420,8 +450,8 @@ _WORTH = 0.01  # of a currency, a year: less is no step
 def _of_parts(part: tuple[float, float] | None, costs: Costs) -> list[str]:
     if part is None:
         return []
-    before, then = (money_of_thousand(joules, costs) for joules in part)
-    return [f"1 000 parts: {then.partition(' for')[0]} instead of {before.partition(' for')[0]}"]
+    before, then = (money(1000.0 * costs.money(joules), costs.currency) for joules in part)
+    return [f"1 000 parts: {then} instead of {before}"]
 
 
 def a_night(idle: IdleSaving | None, costs: Costs) -> list[str]:

@@ -27,7 +27,6 @@ from ir_recorder.report.costs import (
     COMMON,
     J_PER_KWH,
     PLANNED,
-    TODAY,
     Costs,
     Demand,
     IdleSaving,
@@ -58,7 +57,16 @@ from ir_recorder.report.number_text import (
     watts,
 )
 from ir_recorder.report.page import PAGE_START, asset, filled, folded
-from ir_recorder.report.paid import MOVEMENTS, PAUSES, Paid, Tile, at_night, row_of, saved_parts
+from ir_recorder.report.paid import (
+    MOVEMENTS,
+    PAUSES,
+    Before,
+    Paid,
+    Tile,
+    at_night,
+    row_of,
+    saved_parts,
+)
 from ir_recorder.report.series import long_rests
 from ir_recorder.report.shell import badge
 from ir_recorder.report.step_table import TableValue, write_columns
@@ -187,9 +195,9 @@ def tiles(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     )
 
 
-def program_before(found: BeforeAfter) -> str:
-    """The name of what the planned program is held against."""
-    return COMMON if found.kind == COMMON else TODAY
+def program_before(found: BeforeAfter) -> Before:
+    """What the planned program is held against."""
+    return Before.COMMON if found.kind == COMMON else Before.TODAY
 
 
 def shown_name(found: BeforeAfter, side: Side) -> str:

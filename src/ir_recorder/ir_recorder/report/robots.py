@@ -26,6 +26,7 @@ from ir_recorder.analysis.robots import STAMPS, zone_passes
 from ir_recorder.analysis.tending import Span
 from ir_recorder.report.answer import Answer
 from ir_recorder.report.costs import (
+    DRIVEN,
     Costs,
     IdleSaving,
     assumed_section,
@@ -62,7 +63,7 @@ from ir_recorder.report.number_text import (
     watts,
 )
 from ir_recorder.report.page import PAGE_START
-from ir_recorder.report.paid import Paid, Tile, a_night, counted_at, first_steps, row_of
+from ir_recorder.report.paid import Paid, RunNow, Tile, a_night, counted_at, first_steps, row_of
 from ir_recorder.report.shell import shell
 from ir_recorder.report.tables import check_table, table
 from ir_values.files import ANYWHERE, FileRoots
@@ -167,7 +168,7 @@ def _picture(analyses: Mapping[str, Analysis], cycle: Production | None, costs: 
     """A year of all robots, and what rest outside of the shifts saves of it."""
     if cycle is None:
         return ""
-    driven = (f"as driven, {cycle.origin}", costs.energy_of_year(cycle).value)
+    driven = RunNow(DRIVEN, costs.energy_of_year(cycle).value, cycle.origin)
     said = f", {cycles_of_year(cycle.pace, costs)}"
     return Paid(None, 0.0, _idle_of_all(analyses, costs), said, driven=driven).picture(costs)
 
