@@ -78,8 +78,10 @@ class Prey:
 
 
 @contextmanager
-def prey(**parameters: str | int) -> Iterator[Prey]:
-    """A driver with the ideal robot, short transitions and Modbus; parameters: more of it."""
+def prey(*, watched: bool = True, **parameters: str | int) -> Iterator[Prey]:
+    """A driver with the ideal robot, short transitions and Modbus; parameters: more of it.
+    watched: whether `modes` are heard.
+    """
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = int(free.getsockname()[1])
@@ -100,7 +102,8 @@ def prey(**parameters: str | int) -> Iterator[Prey]:
         ):
             modes: list[int] = []
             client.next_message(names.POWER_STATE, PowerState)
-            client.subscribe(names.POWER_STATE, PowerState, lambda msg: modes.append(msg.mode))
+            if watched:
+                client.subscribe(names.POWER_STATE, PowerState, lambda msg: modes.append(msg.mode))
             yield Prey(process.pid, port, client, modes, Path(logs))
 
 

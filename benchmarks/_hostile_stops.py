@@ -13,29 +13,33 @@ import json
 import os
 import random
 import socket
+import struct
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from typing import Any
 
 import numpy as np
 from _hostile_node import PRESS, RELEASE, Prey, prey
 from rclpy.action import ActionClient
+from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, UInt64
 from trajectory_msgs.msg import JointTrajectory as TrajectoryMsg
 
 from ir_msgs.action import ExecuteTrajectory
-from ir_msgs.msg import PlcInputs
+from ir_msgs.msg import PlcInputs, PowerState
 from ir_msgs.srv import Recover, SetPlcInput
 from ir_msgs_py import names
 from ir_msgs_py.modes import Mode
 from ir_msgs_py.ros.client import Client
-from ir_msgs_py.ros.conversions import trajectory_to_msg
+from ir_msgs_py.ros.conversions import float_array, trajectory_to_msg
+from ir_msgs_py.ros.rclpy_inside import take_bytes
 from ir_msgs_py.ros.testing import own_domain
-from ir_msgs_py.ros.topics import ACTION_SERVICES
+from ir_msgs_py.ros.topics import ACTION_SERVICES, PolledGroup
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_values.errors import IrError
 
@@ -43,6 +47,7 @@ NEW = 5  # axis of the goals that are sent after the recovery
 STILL = 1e-3  # rad; a motor that is switched on again takes up less
 ROLLS = 5.0  # s in which a stopped robot has to stand, on a busy machine
 PATIENCE = 30.0
+BACK = 1.5  # s of the goal that brings the robot home
 PLC = ("conf_mess", "drives_on", "drives_off", "move_enable", "ab", "end_rest", "aut")
 SHORT = {
     "joint_state_rate": 100,
@@ -53,6 +58,56 @@ SHORT = {
     "transitions.stand_on_brakes_enter": "0.02",
     "transitions.stand_on_brakes_minimum_stay": "0.02",
 }
+
+
+DEEP = QoSProfile(depth=2_000)  # of the driver's streams: nothing is lost between two looks
+_HEAD = 4  # bytes of CDR in front of a message; what follows is aligned from there
+
+
+class Stream:
+    """A topic whose messages wait, as bytes of CDR, until somebody asks: to wake an executor for
+    each costs more processor than all else that a stop needs.
+    """
+
+    def __init__(self, node: Node, kind: Any, topic: str) -> None:
+        self._subscription = node.create_subscription(
+            kind, topic, lambda data: None, DEEP, callback_group=PolledGroup(), raw=True
+        )
+
+    def take(self) -> Iterator[bytes]:
+        """All that have come, oldest first."""
+        while (taken := take_bytes(self._subscription)) is not None:
+            yield taken[0]
+
+
+def after_header(data: bytes) -> int:
+    """Where the field behind a std_msgs/Header that begins a message lies, before it is aligned."""
+    return _after_text(data, _HEAD + 8)
+
+
+def stamp_of(data: bytes) -> int:
+    """Stamp [ns] of a message that begins with a std_msgs/Header."""
+    seconds, nanoseconds = struct.unpack_from("<iI", data, _HEAD)
+    return int(seconds) * 10**9 + int(nanoseconds)
+
+
+def positions_in(data: bytes) -> int:
+    """Where the positions of a sensor_msgs/JointState begin; the same in all of one driver."""
+    at = _aligned(after_header(data), 4)
+    (count,) = struct.unpack_from("<I", data, at)
+    at += 4
+    for _ in range(count):
+        at = _after_text(data, _aligned(at, 4))
+    return _aligned(_aligned(at, 4) + 4, 8)
+
+
+def _after_text(data: bytes, at: int) -> int:
+    (size,) = struct.unpack_from("<I", data, at)
+    return at + 4 + int(size)
+
+
+def _aligned(at: int, size: int) -> int:
+    return _HEAD + -(-(at - _HEAD) // size) * size
 
 
 class Cell:
@@ -75,15 +130,18 @@ class Cell:
         self.goals: list[Any] = []
         self.number = 0  # of the last stop
         self.latched = False
-        driver.client.subscribe(names.JOINT_STATES, JointState, self._hear)
+        self.mode: int | None = None
+        run = driver.client._executor.run
+        node = driver.client.node
+        self._joints = run(lambda: Stream(node, JointState, names.JOINT_STATES))
+        self._powers = run(lambda: Stream(node, PowerState, names.POWER_STATE))
+        self._positions = 0
         driver.client.subscribe(names.STOP_NUMBER, UInt64, self._count)
         driver.client.subscribe(names.STOP_LATCHED, Bool, self._latch)
         self._actions = [
             client._executor.run(lambda client=client: self._action(client))
             for client in self.clients
         ]
-        node = driver.client.node
-        run = driver.client._executor.run
         self._plc = run(
             lambda: node.create_publisher(PlcInputs, names.PLC_INPUTS, QoSProfile(depth=1000))
         )
@@ -92,7 +150,7 @@ class Cell:
         )
         ready = (lambda: self.q is not None, self._plc.get_subscription_count)
         for each in (*ready, *(action.server_is_ready for action in self._actions)):
-            driver.client._executor.wait_until(each, PATIENCE)
+            self.wait(each)
 
     @staticmethod
     def _action(client: Client) -> ActionClient:
@@ -100,14 +158,19 @@ class Cell:
             client.node, ExecuteTrajectory, names.EXECUTE_TRAJECTORY, **ACTION_SERVICES
         )
 
-    def _hear(self, message: JointState) -> None:
-        q = np.array(message.position)
-        self.home = q if self.home is None else self.home
-        self.q = q
-        if self._mark is not None:
-            self.moved.update(np.flatnonzero(np.abs(q - self._mark) > STILL).tolist())
-        self.stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
-        self.heard += 1
+    def hear(self) -> None:
+        """Look at every position that has come, and at the mode."""
+        for data in self._joints.take():
+            self._positions = self._positions or positions_in(data)
+            q = np.frombuffer(data, "<f8", 6, self._positions)
+            self.home = q if self.home is None else self.home
+            self.q = q
+            if self._mark is not None and np.abs(q - self._mark).max() > STILL:
+                self.moved.update(np.flatnonzero(np.abs(q - self._mark) > STILL).tolist())
+            self.stamp = stamp_of(data)
+            self.heard += 1
+        for data in self._powers.take():
+            self.mode = data[after_header(data)]
 
     def _count(self, message: UInt64) -> None:
         self.number = message.data
@@ -117,6 +180,7 @@ class Cell:
 
     def mark(self) -> None:
         """Note from here on which axes turn."""
+        self.hear()
         self.moved = set()
         self._mark = self.q
 
@@ -139,7 +203,12 @@ class Cell:
 
     def wait(self, condition: Callable[[], Any], seconds: float = PATIENCE) -> bool:
         """Whether it holds within this time."""
-        return self.driver.client._executor.wait_until(condition, seconds)
+
+        def holds() -> bool:
+            self.hear()
+            return bool(condition())
+
+        return self.driver.client._executor.wait_until(holds, seconds)
 
     def send(self, generator: random.Random, axis: int, *, plain: bool = False) -> None:
         """A goal that turns one axis from where the robot is; plain: and brings the others home,
@@ -147,16 +216,20 @@ class Cell:
         """
         points = 2 if plain else generator.choice((2, 2, 2, 500, 5_000))
         seconds = generator.uniform(0.2, 1.0)
+        self.hear()
         target = np.array(self.home if plain else self.q)
         target[axis] += 0.05 if self.q[axis] < self.home[axis] else -0.05
-        seconds = 4.0 if plain else seconds
+        seconds = BACK if plain else seconds
+        message = message_of(points)
         share = np.linspace(0.0, 1.0, points)[:, None]
         positions = self.q + (share * share * (3.0 - 2.0 * share)) * (target - self.q)
         rates = 6.0 * share * (1.0 - share) * (target - self.q) / seconds
-        times = 0.3 + seconds * share[:, 0]
-        message = trajectory_to_msg(
-            JointTrajectory.from_seconds(names.JOINT_NAMES, times, positions, rates)
-        )
+        times = np.rint((0.3 + seconds * share[:, 0]) * 1e9).astype(np.int64).tolist()
+        for point, q, qd, at in zip(message.points, positions, rates, times, strict=True):
+            point.positions = float_array(q)
+            point.velocities = float_array(qd)
+            point.time_from_start.sec, point.time_from_start.nanosec = divmod(at, 10**9)
+        message.header.stamp.sec, message.header.stamp.nanosec = (0, 0)
         sender = generator.choice((0, 1))
         if not plain and generator.random() < 0.2:
             self.driver.client._executor.run(lambda: self._path.publish(message))
@@ -215,23 +288,34 @@ class Cell:
         """Recover until the motors are on."""
         for _ in range(100):
             self.driver.client.call(names.RECOVER, Recover.Request())
-            del self.driver.modes[:]
-            self.wait(lambda: self.driver.modes)
-            if self.driver.modes[-1] == Mode.STAND_ON_BRAKES:
+            self.hear()
+            self.mode = None
+            self.wait(lambda: self.mode is not None)
+            if self.mode == Mode.STAND_ON_BRAKES:
                 self.write("drives_on", True)
                 time.sleep(0.03)
                 self.write("drives_on", False)
-            if self.driver.modes[-1] == Mode.STAND_ON_MOTORS:
+            if self.mode == Mode.STAND_ON_MOTORS:
                 return True
             time.sleep(0.02)
         return False
+
+
+@cache
+def message_of(points: int) -> TrajectoryMsg:
+    """A trajectory of so many points, to be filled again and again: a message is written when it is
+    sent, and making thousands of points takes longer than sending them.
+    """
+    times = np.arange(1, points + 1, dtype=np.float64)
+    zeros = np.zeros((points, 6))
+    return trajectory_to_msg(JointTrajectory.from_seconds(names.JOINT_NAMES, times, zeros, zeros))
 
 
 @contextmanager
 def cell() -> Iterator[Cell]:
     """A driver with short ways between its modes."""
     with (
-        prey(**SHORT) as driver,
+        prey(watched=False, **SHORT) as driver,
         Client(timeout=PATIENCE, node_name="second") as second,
         socket.create_connection(("127.0.0.1", driver.port), timeout=PATIENCE) as modbus,
     ):
@@ -277,7 +361,7 @@ def episode(cell: Cell, generator: random.Random) -> None:
         cell.write("move_enable", True)
     time.sleep(0.025)
     _stands(cell, "after the release")
-    _holds(cell.run(), f"no recovery: mode {cell.driver.modes[-1:]}")
+    _holds(cell.run(), f"no recovery: mode {cell.mode}")
     # when all have a result nothing is left that could move; the topic gives none
     _holds(cell.ended() is not None, "a goal has no result")
     cell.frames(generator.choice((2, 5, 20)))
@@ -303,6 +387,7 @@ def _press(cell: Cell, generator: random.Random, bits: tuple[str, ...]) -> None:
 
 
 def _stands(cell: Cell, when: str) -> None:
+    cell.hear()
     _holds(not cell.moved, f"axes {sorted(cell.moved)} move {when}")
 
 
@@ -312,6 +397,7 @@ def _moves(cell: Cell, generator: random.Random) -> None:
     cell.send(generator, NEW, plain=True)
     codes = cell.ended()
     _holds(codes == [0], f"a goal of after the recovery ends with {codes}")
+    cell.hear()
     _holds(NEW in cell.moved, f"only axes {sorted(cell.moved)} move by a goal for axis {NEW}")
 
 
