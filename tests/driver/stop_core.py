@@ -14,12 +14,13 @@ from ir_sim_driver.controller.mode_control import ModeControl
 from ir_sim_driver.controller.settings import SimulationSettings
 from ir_sim_driver.errors import RequestRefusedError, TrajectoryRefusedError
 from ir_sim_driver.motion import ExecutionSettings
-from ir_sim_driver.plc import TOPIC, Plc, PlcSettings
+from ir_sim_driver.plc import OFF_BIT, SERVICE, TOPIC, Plc, PlcSettings, giver_of
 
 EXECUTION = ExecutionSettings()
 SETTINGS = SimulationSettings(transitions=TransitionTimes(), plc=PlcSettings(startup_window=0.0))
 
 
+RUNNER = "runner"  # client of the service: the program's
 QUARTER = 0.25  # s: no time of a mode ends within a quarter, nor do eight waits of 21 ms reach one
 
 
@@ -147,10 +148,20 @@ class Core:
         self.moving = self.plc.stop.number
         return True
 
+    def rest(self) -> None:
+        """The program runner closes the brakes."""
+        self.plc.write(SERVICE, {OFF_BIT: True}, RUNNER)
+        self.heed()
+
+    def take_back(self) -> None:
+        """The program runner takes its drives_off back, also after a stop; on the network."""
+        with suppress(RequestRefusedError):
+            self.control.take_back(OFF_BIT, giver_of(SERVICE, RUNNER))
+
     def end_rest(self) -> None:
         """The program runner leaves a rest on brakes, on the network."""
         with suppress(RequestRefusedError):
-            self.control.end_rest(TOPIC)
+            self.control.end_rest(giver_of(SERVICE, RUNNER))
 
     def key(self) -> tuple[Any, ...]:
         """All that decides what may happen next, without what only counts."""
@@ -170,6 +181,7 @@ class Core:
             conf < drives, plc.operating_mode, modes.mode, modes.source,
             min(int(modes.elapsed / QUARTER), 800), modes._wake,
             latches.drives_off, latches.recover, latches.restart, latches.wake,
+            frozenset(plc.off_by), frozenset(plc._gave[OFF_BIT]), plc.off_taken_back,
             latches.end_rest == number if latches.end_rest is not None else None,
             pauses.wants_motors, pauses._route, control._stop_seen == number,
             self.moving == number if self.moving is not None else None,

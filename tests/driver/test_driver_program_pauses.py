@@ -77,7 +77,7 @@ class Plant:
             case ask.SetPlcInput(name, value):
                 plant.plc.set_bit(name, value)
             case ask.TakeBack(name):
-                plant.plc.take_back(name, "")
+                plant.control.take_back(name)
             case ask.AskModes():
                 return Status.success(), plant.pauses.query_modes()
             case ask.SendWakePacket():

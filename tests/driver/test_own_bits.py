@@ -31,7 +31,7 @@ def wait(core: Core, steps: int) -> None:
 def taken_back(core: Core, bit: str) -> None:
     """All that the program runner does at the end of a pause."""
     with suppress(RequestRefusedError):
-        core.plc.take_back(bit, RUNNER)
+        core.control.take_back(bit, RUNNER)
     if bit == "drives_off":
         with suppress(RequestRefusedError):
             core.control.end_rest(RUNNER)

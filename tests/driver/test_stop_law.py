@@ -50,6 +50,18 @@ class Pair:
             self.core.recover()
             self.reference.recover()
 
+    def rest(self) -> None:
+        """The program runner closes the brakes."""
+        if self.core.on_the_network:
+            self.core.rest()
+            self.reference.write({"drives_off": True}, "program")
+
+    def take_back(self) -> None:
+        """The program runner takes its drives_off back."""
+        if self.core.on_the_network:
+            self.core.take_back()
+            self.reference.take_back()
+
     def end_rest(self) -> None:
         """The program runner leaves a rest on brakes."""
         if self.core.on_the_network:
@@ -84,6 +96,9 @@ class Pair:
         other = (self.reference.state, self.reference.number)
         if mine != other:
             return f"the driver is {mine}, the table says {other}"
+        kept_off = self.core.control.latches.drives_off or self.core.plc.levels.drives_off
+        if self.core.on_the_network and kept_off != self.reference.drives_kept_off:
+            return f"drives_on is needed: {kept_off}, the table says {not kept_off}"
         if stop.stopped and self.core.moving is not None:
             return f"a goal runs in {stop.state.value}"
         if self.core.moving is not None and self.core.moving != stop.number:
@@ -112,8 +127,9 @@ def drawn(steps: int, seed: int) -> str:
         pair.wait(21)
         pair.pass_time(generator.choice((500, 1_000, 3_000, 25_000, 130_000)))
 
-    actions = (write, pair.fault, pair.recover, send, pair.end_rest, wake, leap)
-    weights = (70, 3, 5, 6, 3, 7, 5)
+    program = (pair.rest, pair.take_back, pair.end_rest)
+    actions = (write, pair.fault, pair.recover, send, *program, wake, leap)
+    weights = (70, 3, 5, 6, 4, 3, 3, 7, 5)
     for step in range(steps):
         generator.choices(actions, weights)[0]()
         pair.wait(generator.choice((0, 1, 5, 19, 20, 21, 40)))
@@ -233,12 +249,23 @@ def _program_drives(world: World) -> str:
     return ""
 
 
-def _program_ends_rest(world: World) -> str:
-    before = world.pair.core.plc.stop.state
-    if world.program is not None:
-        world.pair.end_rest()
-    recovered = before is not StopState.RUN and not world.pair.core.plc.stop.stopped
-    return "a program recovers" if recovered else ""
+def _program_rests(world: World) -> str:
+    if world.program == world.pair.core.plc.stop.number and not world.pair.core.plc.stop.stopped:
+        world.pair.rest()
+    return ""
+
+
+def _program(what: Callable[[Pair], None]) -> Event:
+    """What a program does at the end of its rest, also after a stop that ended it."""
+
+    def event(world: World) -> str:
+        before = world.pair.core.plc.stop.state
+        if world.program is not None:
+            what(world.pair)
+        recovered = before is not StopState.RUN and not world.pair.core.plc.stop.stopped
+        return "a program recovers" if recovered else ""
+
+    return event
 
 
 def _short(world: World) -> str:
@@ -273,7 +300,9 @@ EVENTS: dict[str, Event] = {
     "goal b is checked": _checked(1),
     "program starts": _program_starts,
     "program drives": _program_drives,
-    "program ends its rest": _program_ends_rest,
+    "program rests": _program_rests,
+    "program takes it back": _program(Pair.take_back),
+    "program ends its rest": _program(Pair.end_rest),
     "fault": _plain(lambda world: world.pair.fault()),
     "recover": _plain(lambda world: world.pair.recover()),
     "wake": _plain(_wake),
@@ -295,6 +324,7 @@ def settled(*levels: dict[str, bool]) -> World:
 STARTS: dict[str, Callable[[], World]] = {
     "on motors": lambda: settled(),
     "on brakes": lambda: _after(settled({"drives_off": True}), "130 s"),
+    "in a program's rest": lambda: _after(settled(), "program starts", "program rests", "130 s"),
     "bus power off": lambda: _after(settled({"ab": True}), "130 s"),
     "on the way to bus power off": lambda: settled({"ab": True}),
     "on the way from it": lambda: _after(settled({"ab": True}), "130 s", "ab", "21 ms"),
@@ -422,24 +452,56 @@ def test_a_program_s_wish_to_leave_its_rest_never_recovers() -> None:
 
 
 def test_what_a_program_has_taken_back_hinders_no_recovery() -> None:
-    world = _after(STARTS["on brakes"](), "program starts", "program ends its rest", "21 ms")
+    world = _after(STARTS["in a program's rest"](), "program ends its rest", "21 ms")
     for name in ("emergency_stop", "emergency_stop", "conf_mess", "drives_on", "21 ms"):
         assert EVENTS[name](world) == ""
         assert world.pair.difference() == ""
     assert world.pair.core.plc.stop.state is StopState.RUN
 
 
-def test_a_wish_to_leave_a_rest_is_void_after_a_stop() -> None:
+@pytest.mark.parametrize("when", ["before", "while it is latched", "after"])
+@pytest.mark.parametrize("also_plc", [False, True])
+def test_a_stop_in_a_program_s_rest_leaves_no_drives_off_but_the_plc_s(
+    when: str, also_plc: bool
+) -> None:
+    """What the program takes back keeps no goal off after the recovery, and opens no brakes before
+    it; a pulse of the PLC does.
+    """
     pair = Pair()
-    pair.write({"drives_off": True})
+    pair.rest()
+    pair.wait(25)
+    if also_plc:
+        pair.write({"drives_off": True})
+    pair.wait(500)
+    if also_plc:
+        pair.write({"drives_off": False})
+    if when == "before":
+        pair.core.end_rest()
+    pair.write({"emergency_stop": True})
+    if when == "while it is latched":
+        pair.core.take_back()
+    pair.wait(25)
+    pair.write({"emergency_stop": False})
+    pair.wait(50)
+    assert pair.core.mode is Mode.EMERGENCY_STOP
+    assert pair.core.plc.stop.state is StopState.RELEASED
+    pair.recover()
+    if when == "after":
+        pair.core.take_back()
+    pair.wait(1000)
+    assert pair.core.start(pair.core.plc.stop.number) == (not also_plc)
+
+
+def test_a_wish_to_leave_a_rest_is_void_after_a_stop() -> None:
+    """The program has asked for open brakes before the stop: nothing asks for them after it."""
+    pair = Pair()
+    pair.rest()
     pair.wait(25)
     pair.core.end_rest()  # counts when drives_off has been 0 for the debounce
-    for levels in ({"emergency_stop": True}, {"emergency_stop": False}, {"drives_off": False}):
-        pair.write(levels)
-        pair.wait(25)
-    pair.recover()
-    pair.wait(50)
-    assert pair.core.control.latches.drives_off
+    pair.write({"emergency_stop": True})
+    pair.wait(25)
+    assert pair.core.control.latches.end_rest is None
+    assert not pair.core.control.pauses.wants_motors
 
 
 def test_drives_on_in_the_message_of_its_acknowledgement_recovers_nothing() -> None:

@@ -5,6 +5,7 @@ interfaces.
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from sensor_msgs.msg import JointState
 from ir_msgs.action import RunProgram
 from ir_msgs.msg import PowerState
 from ir_msgs.srv import Recover, SetPlcInput
-from ir_msgs_py.modes import Mode
+from ir_msgs_py.modes import DEEPER, Mode
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.report import PlannedMovement
 from ir_msgs_py.ros.client import Client
@@ -66,8 +67,7 @@ def client(ros_context, ros_executor):
 
 
 def test_a_program_with_every_power_mode_runs_on_the_driver(client):
-    state = client.next_message("/joint_states", JointState)
-    here = np.array([state.position[list(state.name).index(name)] for name in JOINT_NAMES])
+    here = positions(client)
     there = here + 0.1 * np.eye(6)[0]
     modes = []
     client.subscribe(
@@ -94,8 +94,7 @@ def test_a_program_asked_for_before_a_stop_is_not_run_after_it(
     client, ros_executor, ros_node, wait_for
 ):
     """However late the runner takes it: its process was suspended, say."""
-    state = client.next_message("/joint_states", JointState)
-    here = np.array([state.position[list(state.name).index(name)] for name in JOINT_NAMES])
+    here = positions(client)
     there = here + 0.1 * np.eye(6)[0]
     goal = RunProgram.Goal(movements=[planned_movement_to_msg(move(here, there))])
     asking = ActionClient(ros_node, RunProgram, "/ir_program_runner/run_program")
@@ -123,6 +122,42 @@ def test_a_program_asked_for_before_a_stop_is_not_run_after_it(
     assert "ended the program" in ended.result().result.status.message
     again = client.send_goal("/ir_program_runner/run_program", goal, timeout=PATIENCE)
     assert again.status.code == StatusCode.SUCCESS, again.status.message
+
+
+@pytest.mark.parametrize(
+    "power_mode", ["STAND_ON_BRAKES", "BUS_POWER_OFF", "STAND_ON_BRAKES>BUS_POWER_OFF"]
+)
+def test_a_stop_in_a_rest_needs_no_more_than_its_recovery(power_mode, client, ros_node, wait_for):
+    """A program that a stop ends takes its own bits back: after `recover` a new one drives."""
+    modes = []
+    client.subscribe(
+        "/ir_sim_driver/power_state", PowerState, lambda reading: modes.append(Mode(reading.mode))
+    )
+    here = positions(client)
+    there = here + 0.1 * np.eye(6)[0]
+    steps = [replace(pause(power_mode), duration=PATIENCE), move(here, there)]
+    goal = RunProgram.Goal(movements=[planned_movement_to_msg(step) for step in steps])
+    asking = ActionClient(ros_node, RunProgram, "/ir_program_runner/run_program")
+    wait_for(asking.server_is_ready, what="the runner is there")
+    accepted = asking.send_goal_async(goal)
+    rest = Mode[power_mode.split(DEEPER)[-1]]
+    wait_for(lambda: rest in modes, what=f"it rests in {rest.name}")
+    press(client, True)
+    wait_for(accepted.done, what="the goal is accepted")
+    ended = accepted.result().get_result_async()
+    wait_for(ended.done, what="the stop ends it")
+    assert "ended the program" in ended.result().result.status.message
+    press(client, False)
+    wait_for(lambda: recovers(client), what="the button is released for the debounce")
+    again = RunProgram.Goal(movements=[planned_movement_to_msg(move(here, there))])
+    result = client.send_goal("/ir_program_runner/run_program", again, timeout=PATIENCE)
+    assert result.status.code == StatusCode.SUCCESS, result.status.message
+    assert np.abs(positions(client) - there).max() < 1e-2
+
+
+def positions(client):
+    state = client.next_message("/joint_states", JointState)
+    return np.array([state.position[list(state.name).index(name)] for name in JOINT_NAMES])
 
 
 def recovers(client):

@@ -355,7 +355,7 @@ class Driver:
                     if name == END_REST:
                         simulation.control.end_rest(giver)
                     else:
-                        plc.take_back(_TAKEN_BACK[name], giver)
+                        simulation.control.take_back(_TAKEN_BACK[name], giver)
                 return plc.raw, ""
             try:
                 plc.raw.with_bit(name, level)

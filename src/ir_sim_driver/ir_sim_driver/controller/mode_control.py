@@ -26,8 +26,9 @@ from ir_sim_driver.power import (
 
 class Latches:
     """drives_off: it came and no drives_on since. recover, restart, wake: waiting to be acted upon.
+
     end_rest: number of the stop after which a program asked to open the brakes again, None: no
-    program has. end_rest_by: that program.
+    program has.
     """
 
     def __init__(self) -> None:
@@ -36,7 +37,6 @@ class Latches:
         self.restart = False
         self.wake = False
         self.end_rest: int | None = None
-        self.end_rest_by = ""
 
     def react(self, plc: Plc, mode: Mode) -> bool:
         """Take the edges of this step in `mode`; whether motors are asked for."""
@@ -47,8 +47,7 @@ class Latches:
             plc.stop.acknowledge(plc.rose("conf_mess"))
         if not plc.drives_on or plc.levels.drives_off:
             return False
-        self.drives_off = False
-        plc.off_by.clear()
+        self.forget_drives_off(plc)
         if awake and plc.stop.switch_on(plc.rose("drives_on")):
             self.recover = mode is Mode.EMERGENCY_STOP
         return True
@@ -57,26 +56,32 @@ class Latches:
         """Whether the program's wish to leave its rest counts now; a stop makes it void, and so
         does a drives_off of anybody else.
         """
+        self.let_go(plc)
         if self.end_rest is None or plc.levels.drives_off or plc.raw.drives_off:
             return False
-        counts = self.end_rest == plc.stop.number and not plc.stop.stopped
-        counts = counts and not plc.keeps_off(self.end_rest_by)
+        counts = self.end_rest == plc.stop.number and not (plc.stop.stopped or self.drives_off)
         self.end_rest = None
-        if counts:
-            self.drives_off = False
-            plc.off_by.clear()
         return counts
+
+    def let_go(self, plc: Plc) -> None:
+        """Forget the drives_off that its only giver has taken back, once its level has fallen."""
+        if plc.off_taken_back and not plc.levels.drives_off:
+            self.forget_drives_off(plc)
+
+    def forget_drives_off(self, plc: Plc) -> None:
+        """Goals are no longer refused because of it."""
+        self.drives_off = False
+        plc.off_by.clear()
+        plc.off_taken_back = False
 
     def mode_changed(self, plc: Plc, before: Mode, now: Mode) -> None:
         """Forget what the change of the power mode has done or made void."""
         if Mode.EMERGENCY_STOP in (before, now):
             self.recover = False
-        if before is Mode.FROM_HIBERNATION:
+        if before is Mode.FROM_HIBERNATION or now in OFF_THE_NETWORK:
             self.restart = False
+            self.forget_drives_off(plc)
         if now in OFF_THE_NETWORK:
-            self.restart = False
-            self.drives_off = False
-            plc.off_by.clear()
             plc.stop.leave_network()
 
 
@@ -288,10 +293,18 @@ class ModeControl:
         self._mode_changed(before, now)
         return before, now
 
+    def take_back(self, bit: str, giver: str = "") -> None:
+        """A giver takes its own 1 of one of OWN_BITS back; a drives_off is not latched any more
+        then. Raises RequestRefusedError where anybody else has given it too.
+        """
+        self._plc.take_back(bit, giver)
+        self.latches.let_go(self._plc)
+
     def end_rest(self, giver: str = "") -> None:
-        """A program leaves the rest that its drives_off began; void while a stop is latched, and
-        never a part of a recovery. Raises RequestRefusedError, also where anybody but the giver
-        has given drives_off.
+        """A program leaves the rest that its drives_off began: takes it back, and the brakes open.
+
+        Void while a stop is latched, and never a part of a recovery. Raises RequestRefusedError,
+        also where anybody but the giver has given drives_off.
         """
         if self._plc.stop.stopped:
             number = stop_count(self._plc.stop.number)
@@ -299,15 +312,8 @@ class ModeControl:
                 StatusCode.INVALID_ROBOT_STATE,
                 f"stop {number} is latched: a person has to recover first",
             )
-        other = self._plc.keeps_off(giver)
-        if other:
-            raise RequestRefusedError(
-                StatusCode.INVALID_ROBOT_STATE,
-                f"drives_off was given by {other}: drives_on is needed",
-            )
-        self._plc.take_back(OFF_BIT, giver)
+        self.take_back(OFF_BIT, giver)
         self.latches.end_rest = self._plc.stop.number
-        self.latches.end_rest_by = giver
 
     def end_pause(self) -> float:
         """PROFIenergy End_Pause: back to motors; the seconds until they are on.

@@ -140,6 +140,8 @@ class Plc:
     None.
     stop: the state machine of stops; a press is latched there when it is written, however short.
     order: of the last message; levels that it raised have this order.
+    off_by: who has given the drives_off since which no drives_on came. off_taken_back: its only
+    giver has taken it back, and nobody has given it since.
     drives_on, confirm, restart: rising edges seen in this step. no_hibernation: why HIB is ignored,
     "" where it counts.
     """
@@ -169,6 +171,7 @@ class Plc:
         self.restart = False
         self._gave: dict[str, set[str]] = {bit: set() for bit in OWN_BITS}  # since it was 0
         self.off_by: set[str] = set()
+        self.off_taken_back = False
         self._ages: dict[str, float] = {}
         self._stuck: frozenset[str] = frozenset()
         self._uptime = 0.0
@@ -369,19 +372,27 @@ class Plc:
             )
         if getattr(self.raw, bit):
             self.set_bit(bit, False)
+        if bit == OFF_BIT:
+            self._take_latched_back(giver)
 
-    def keeps_off(self, giver: str) -> str:
-        """Who else has given the drives_off that counts or is 1, "" for nobody."""
-        held = self._gave[OFF_BIT] if self.raw.drives_off else set()
-        return _named((self.off_by | held) - {giver})
+    def _take_latched_back(self, giver: str) -> None:
+        """drives_off outlasts its level: take that back too, where nobody else has given it."""
+        others = self.off_by - {giver}
+        if others:
+            raise RequestRefusedError(
+                StatusCode.INVALID_ROBOT_STATE,
+                f"drives_off was given by {_named(others)}: drives_on is needed",
+            )
+        self.off_taken_back = True
 
     def _note_giver(self, bit: str, giver: str) -> None:
         """Remember who gives a 1, also one that is there already."""
         if not getattr(self.raw, bit):
             self._gave[bit].clear()
         self._gave[bit].add(giver)
-        if bit == OFF_BIT and self.levels.drives_off:
-            self.off_by.add(giver)
+        if bit == OFF_BIT:
+            self.off_taken_back = False
+            self.off_by |= {giver} if self.levels.drives_off else set()
 
     def _set(self, bit: str, level: bool, *, late: bool = False, giver: str = "") -> None:
         if level and bit in self._gave:
