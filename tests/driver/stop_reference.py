@@ -1,5 +1,5 @@
-"""A reference of the tables "Stop, acknowledgement, recovery" and "A program takes its own bits back"
-in docs/driver.md, for tests.
+"""A reference of docs/driver.md for tests: its tables "Stop, acknowledgement, recovery" and "A
+program takes its own bits back".
 
 Written from the tables alone: it shares no code with the driver and looks at nothing of it. Times
 are whole milliseconds.
