@@ -21,18 +21,13 @@ UNITS = {
     "EUR": 1.0,
 }
 KINDS = {"kWh": "J", "Wh": "J", "kJ": "J", "min": "s"}
-_FIGURE = re.compile(
-    r"(~?)(-?\d[\d\s\u202f]*(?:\.\d+)?) ?(kWh|Wh|kJ|J|W|min|s|mm|%|kg|EUR)(?![\w])"
-)
-_PARTS = ("a:", "b:")  # kinds of amounts: parts of a sum
+_FIGURE = re.compile(r"(-?\d[\d\s\u202f]*(?:\.\d+)?) ?(kWh|Wh|kJ|J|W|min|s|mm|%|kg|EUR)(?![\w])")
 _VOID = ("br", "meta", "link", "input", "wbr", "col", "img")
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A value in SI units with half of its last digit, of a part of a sum, which adds up as it is
-    shown, with a whole one; kind: J, W, s, m, %, kg or EUR.
-    """
+    """A value in SI units with half of its last digit; kind: J, W, s, m, %, kg or EUR."""
 
     name: str
     kind: str
@@ -55,12 +50,12 @@ def plain(page: str) -> str:
 
 def figures_in(words: str, name: str) -> Iterator[Figure]:
     """All figures of a text; of the two ends of an interval the one with the unit."""
-    for part, number, unit in _FIGURE.findall(words):
+    for number, unit in _FIGURE.findall(words):
         digits = re.sub(r"[\s\u202f]", "", number)
         decimals = len(digits.partition(".")[2])
         scale = UNITS[unit]
         kind = KINDS.get(unit, "m" if unit == "mm" else unit)
-        half = (1.0 if part else 0.5) * 10.0**-decimals * scale
+        half = 0.5 * 10.0**-decimals * scale
         yield Figure(name, kind, float(digits) * scale, half)
 
 
@@ -85,8 +80,6 @@ class _Reader(HTMLParser):
         self._caption = ""
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        if tag == "data" and (dict(attrs).get("value") or "").startswith(_PARTS):
-            self.handle_data("~")
         if tag in (*_VOID, "data"):  # data: an amount within its words
             return
         kind = dict(attrs).get("class") or ""

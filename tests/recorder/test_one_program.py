@@ -20,7 +20,7 @@ from ir_recorder.report import report_html
 from ir_recorder.report.compare import comparison_html
 from ir_recorder.report.costs import Costs, recorded_idle_saving
 from ir_recorder.report.fleet import fleet_columns, fleet_html, member_of
-from ir_recorder.report.money_text import adding_up, yearly_money
+from ir_recorder.report.money_text import yearly_money
 from ir_recorder.report.number_text import joules, kilowatt_hours, percent, seconds
 
 SHORTENED = (("unshortened_pauses", "600 s, 1800 s"),)
@@ -223,14 +223,14 @@ def test_nights_are_named_beside_each_year(analysis: Analysis) -> None:
     count = costs.cycles_per_year(cycle.pace)
     total = cycle.savings.total
     rows = (
-        (total.common, idle.left_alone),
-        (cycle.energy, idle.left_alone),
-        (total.planned, idle.deepest),
+        (total.common * count, idle.left_alone),
+        (cycle.energy * count, idle.left_alone),
+        (total.planned * count, idle.deepest),
     )
     noted = re.findall(r"<small>([^<]*) outside</small>", year)
     assert noted == [
-        " in shifts, ".join(adding_up((costs.money(joules * count), nights), "EUR"))
-        for joules, nights in rows
+        " in shifts, ".join(yearly_money(each, "EUR") for each in (costs.money(energy), nights))
+        for energy, nights in rows
     ]
     assert year.count("nights on closed brakes</span>") == 2
     assert "planned program, nights in hibernation</span>" in year

@@ -44,7 +44,6 @@ from ir_recorder.report.costs import (
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import checked, plant_of
 from ir_recorder.report.money_text import (
-    money_of,
     span_of_money,
     yearly_money,
     yearly_span,
@@ -62,7 +61,7 @@ from ir_recorder.report.number_text import (
     watts,
 )
 from ir_recorder.report.page import PAGE_START, asset
-from ir_recorder.report.paid import a_night, counted_at, first_steps, saved_parts
+from ir_recorder.report.paid import a_night, counted_at, first_steps
 from ir_recorder.report.series import Curves, Json, packed, stretches
 from ir_recorder.report.shell import badge, shell
 from ir_recorder.report.tables import COMPACT, table
@@ -189,10 +188,7 @@ def _answer(analyses: Sequence[Analysis], names: Sequence[str], costs: Costs) ->
         do.append("In shifts: choose by time, peak or clearance (Runs in figures).")
     idle = recorded_idle_saving(analyses[0], costs)
     if idle is not None:
-        saved = None if cycles[0] is None else costs.saving_of_year(cycles[0])
-        alone = saved is None or saved.value < 0.0
-        nights = "" if alone or saved is None else _plan_and_nights(saved, idle, costs)[1]
-        do += first_steps((), idle, costs, (nights, ()))
+        do += first_steps((), idle, costs)
         sure.append(f"What nights save is {idle.basis}.")
         paid.append(f"what nights save {payback(idle.money, costs)}")
     words = "; ".join((words, *paid))
@@ -314,14 +310,7 @@ def _year(cycle: Production | None, first: Production | None, costs: Costs) -> s
     return f"{shown}<small>{percent(year / costs.energy_of_year(first).value - 1.0)}</small>"
 
 
-def _plan_and_nights(amount: Amount, idle: IdleSaving, costs: Costs) -> tuple[str, str]:
-    """What a plan and what rest saves of a year, as both add up."""
-    year = saved_year(amount, idle, costs).money
-    nights, plan = saved_parts([costs.money(amount.value)], idle, year, costs)
-    return (plan[0] if plan else ""), nights
-
-
-def _year_saved(cycle: Production | None, costs: Costs, shown: str) -> str:
+def _year_saved(cycle: Production | None, costs: Costs) -> str:
     amount = costs.saving_of_year(cycle) if cycle is not None else None
     if cycle is None or cycle.savings is None or amount is None:
         return DASH
@@ -336,7 +325,7 @@ def _year_saved(cycle: Production | None, costs: Costs, shown: str) -> str:
     if price.high > price.low:
         lines.insert(0, f"{yearly_span(price.low, price.high, costs.currency)} {costs.currency}")
     small = "".join(f"<small>{text(line)}</small>" for line in lines if line)
-    return f"<b>{text(shown or yearly_money(price.value, costs.currency))}</b>{small}"
+    return f"<b>{text(yearly_money(price.value, costs.currency))}</b>{small}"
 
 
 def _saved_rows(
@@ -350,13 +339,7 @@ def _saved_rows(
         for analysis, cycle in zip(analyses, cycles, strict=True)
     ]
     saved = [None if cycle is None else costs.saving_of_year(cycle) for cycle in cycles]
-    shown = [
-        ("", "")
-        if idle is None or amount is None or amount.value < 0.0
-        else _plan_and_nights(amount, idle, costs)
-        for idle, amount in zip(found, saved, strict=True)
-    ]
-    by_plan = [_year_saved(cycle, costs, own[0]) for cycle, own in zip(cycles, shown, strict=True)]
+    by_plan = [_year_saved(cycle, costs) for cycle in cycles]
     rows = [("saved by its plan, a year", *by_plan)]
     if not any(found):
         return rows
@@ -366,10 +349,7 @@ def _saved_rows(
         f"({watts(idle.watts_left_alone)}), {idle.basis}"
     )
     said = f"<small>{text(words)}</small>"
-    nights = (
-        DASH if idle is None else _night(idle, costs, own[1])
-        for idle, own in zip(found, shown, strict=True)
-    )
+    nights = (DASH if idle is None else _night(idle, costs) for idle in found)
     both = (
         DASH if idle is None or amount is None else _both(amount, idle, costs)
         for idle, amount in zip(found, saved, strict=True)
@@ -381,10 +361,10 @@ def _saved_rows(
     ]
 
 
-def _night(idle: IdleSaving, costs: Costs, shown: str) -> str:
+def _night(idle: IdleSaving, costs: Costs) -> str:
     ends = span_of_money(idle.money, costs.currency)
     small = f"<small>{text(ends)}</small>" if ends else ""
-    return f"<b>{text(shown or money_of(idle.money, costs.currency))}</b>{small}"
+    return f"<b>{text(yearly_money(idle.saved, costs.currency))}</b>{small}"
 
 
 def _both(amount: Amount, idle: IdleSaving, costs: Costs) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeGuard
@@ -33,7 +33,6 @@ from ir_recorder.report.money_text import (
     NOTHING,
     UNSEEN,
     Repriced,
-    adding_up,
     hours_of,
     money,
     months_of,
@@ -516,12 +515,6 @@ def money_of_thousand(energy: float, costs: Costs) -> str:
     return f"{money(1000.0 * costs.money(energy), costs.currency)} for 1 000"
 
 
-def moneys_of_thousand(energies: Sequence[float], costs: Costs) -> list[str]:
-    """The same of robots that make a part together, as it adds up."""
-    prices = [1000.0 * costs.money(energy) for energy in energies]
-    return [f"{each} for 1 000" for each in adding_up(prices, costs.currency, yearly=False)]
-
-
 def payback(money: Amount, costs: Costs) -> str:
     """How many hours of an engineer a saving of a year pays for, and after how long one is paid;
     "" where it is open whether anything is saved, or next to nothing is.
@@ -551,45 +544,18 @@ def _saved(cycle: Production, costs: Costs) -> list[tuple[str, ...]]:
     parts = [("by its movements", savings.movements)]
     if savings.pauses.seconds > 0.0:
         parts += [("in its pauses", savings.pauses), ("together", savings.total)]
-    shown = _parts_of_saving([saving for _, saving in parts[:2]], cycle.pace, costs)
-    return [
-        _saving(name, saving, cycle.pace, costs, own)
-        for (name, saving), own in zip(parts, [*shown, ()], strict=False)
-    ]
+    return [_saving(name, saving, cycle.pace, costs) for name, saving in parts]
 
 
-def _parts_of_saving(savings: Sequence[Saving], pace: float, costs: Costs) -> list[tuple[str, ...]]:
-    """Money of movements and of pauses of a thousand parts, a shift and a year, as it adds up;
-    empty where there is no sum, or one of them takes more and the other less.
-    """
-    gains = [saved_amount(saving).gain() for saving in savings]
-    if len({word for word, _ in gains}) > 1 or len(gains) == 1:
-        return [() for _ in savings]
-    columns = [
-        adding_up(
-            [costs.money(amount.value * count) for _, amount in gains],
-            costs.currency,
-            yearly=False,
-        )
-        for count in _counts(pace, costs)
-    ]
-    return [tuple(column[k] for column in columns) for k in range(len(savings))]
-
-
-def _saving(
-    where: str, saving: Saving, pace: float, costs: Costs, own: Sequence[str]
-) -> tuple[str, ...]:
-    """own: its amounts as parts of a sum, empty where there is none."""
+def _saving(where: str, saving: Saving, pace: float, costs: Costs) -> tuple[str, ...]:
     word, amount = saved_amount(saving).gain()
     doubt = f"<small>{amount.doubt}</small>" if amount.doubt else ""
     cells = [f"<b>{kilowatt_hours(amount.value)}</b>{small_span(amount, kilowatt_hours)}{doubt}"]
     counts = _counts(pace, costs)
     year = costs.money(amount.value * counts[-1])
-    for k, count in enumerate(counts):
+    for count in counts:
         price = amount.times(count).of(costs.money)
         shown = _shown(price.value, year, costs.currency)
-        if own and shown != NEXT_TO_NOTHING:
-            shown = own[k]
         between = ""
         if abs(year) >= NOTHING and price.high > price.low:
             between = (
@@ -623,8 +589,12 @@ def counted_with(costs: Costs) -> str:
     )
     return (
         f'{text(words)}<a class="screen" href="#assumed">: all values, and how to give yours</a>. '
-        f"{_stands(costs)}".rstrip()
+        f"{_stands(costs)}{ROUNDED}"
     )
+
+
+ROUNDED = "Each figure is rounded by itself: a sum may differ from its parts in its last digit."
+"""How figures are rounded, on every page that has a sum."""
 
 
 def _stands(costs: Costs) -> str:
@@ -729,16 +699,14 @@ def lever_section(analysis: Analysis, costs: Costs) -> str:
 # The robot around the clock: the largest quarter of an hour, rest outside of the shifts, payback.
 
 
-def clock_section(analysis: Analysis, costs: Costs, nights: str = "") -> str:
-    """Section of the page; "" where no whole cycle is known. nights: what they save, as a part of
-    what is saved in all.
-    """
+def clock_section(analysis: Analysis, costs: Costs) -> str:
+    """Section of the page; "" where no whole cycle is known."""
     cycle = production_of(analysis)
     if cycle is None:
         return ""
     return (
         '<section id="around"><h2>When nobody works</h2>'
-        f"{_idle(analysis, costs, nights)}"
+        f"{_idle(analysis, costs)}"
         f'<p class="hint">{_demand(analysis, cycle, costs)}</p></section>'
     )
 
@@ -922,13 +890,13 @@ def recorded_idle_saving(analysis: Analysis, costs: Costs) -> IdleSaving | None:
     return idle_saving(idle_watts(analysis), rest_saving(analysis), costs, measured=measured)
 
 
-def idle_sentence(found: IdleSaving | None, costs: Costs, shown: str = "") -> str:
-    """The same in words; "" without it. shown: as a part of a sum."""
+def idle_sentence(found: IdleSaving | None, costs: Costs) -> str:
+    """The same in words; "" without it."""
     if found is None:
         return ""
     return (
         f"Outside of shifts: {found.mode} instead of closing the brakes saves "
-        f"{shown or yearly_money(found.saved, costs.currency)} a year, {found.basis}."
+        f"{yearly_money(found.saved, costs.currency)} a year, {found.basis}."
     )
 
 
@@ -951,7 +919,7 @@ def how_to_hibernate(cell: Cell | None) -> str:
 _HIB = "HIB"
 
 
-def _idle(analysis: Analysis, costs: Costs, nights: str) -> str:
+def _idle(analysis: Analysis, costs: Costs) -> str:
     """What the robot draws while nobody works, by power mode."""
     found = idle_watts(analysis)
     if analysis.cell is not None and not analysis.cell.robot.controller.counted:
@@ -976,6 +944,6 @@ def _idle(analysis: Analysis, costs: Costs, nights: str) -> str:
     return (
         f"{table(heads, rows, 'When nobody works', COMPACT)}"
         f'<p class="hint">{significant(costs.idle_hours, 6)} hours a year lie outside of the '
-        f"shifts, at machine home. {text(idle_sentence(saving, costs, nights))} "
+        f"shifts, at machine home. {text(idle_sentence(saving, costs))} "
         f"{text(how_to_hibernate(analysis.cell))}</p>"
     )

@@ -58,10 +58,6 @@ from ir_recorder.report.headline import started
 from ir_recorder.report.methods import counted
 from ir_recorder.report.money_text import (
     NOTHING,
-    adding_up,
-    groups_adding_up,
-    larger_end,
-    money_of,
     yearly_money,
     yearly_span,
 )
@@ -574,9 +570,8 @@ def _answer(paid: Paid, robots: Sequence[Robot], costs: Costs) -> Answer:
 def _steps(paid: Paid, robots: Sequence[Robot], costs: Costs) -> tuple[list[str], list[str]]:
     """What is to do, what saves most first; and what was done already."""
     found: list[tuple[float, str]] = []
-    left = _left_shown(robots, paid.idle, costs)
     if paid.idle is not None:
-        price = with_span(paid.idle.money, costs, left.get(_NIGHTS, ""))
+        price = with_span(paid.idle.money, costs)
         resting = at_night(paid.idle)
         several = sum(not robot.drives_only for robot in robots) > 1
         words = f"All together in {resting}" if several else f"{resting[0].upper()}{resting[1:]}"
@@ -592,8 +587,7 @@ def _steps(paid: Paid, robots: Sequence[Robot], costs: Costs) -> tuple[list[str]
         saved = sum_of(gains).of(costs.money)
         if saved.value <= 0.0:
             continue
-        shown = "" if driven else left.get(_PLANS, "")
-        words = f"{_plans(own)}: {with_span(saved, costs, shown)} a year."
+        words = f"{_plans(own)}: {with_span(saved, costs)} a year."
         if driven:
             done.append(words)
         else:
@@ -789,16 +783,12 @@ def _robots(members: Sequence[Member], robots: Sequence[Robot], costs: Costs) ->
     """Those that cost most, each with what to change first; the others in one row."""
     rest = robots[_MOST_ROBOTS:]
     others = [robot for robot in rest if not robot.drives_only]
-    first = [[robot] for robot in robots[:_MOST_ROBOTS]]
-    shown = _adding_up([*first, others] if others else first, members, costs)
-    rows = [
-        _robot_row(robot, members, costs, own) for (robot,), own in zip(first, shown, strict=False)
-    ]
+    rows = [_robot_row(robot, members, costs) for robot in robots[:_MOST_ROBOTS]]
     if others:
         without = len(rest) - len(others)
         name = counted(len(rest), "other robot")
         name += f"<small>{without} of them in no sum</small>" if without else ""
-        rows.append((name, *_sums(others, members, costs, shown[-1]), DASH))
+        rows.append((name, *_sums(others, members, costs), DASH))
     summed = [robot for robot in robots if not robot.drives_only]
     if len(summed) > 1:
         recordings = counted(sum(robot.recordings for robot in summed), "file")
@@ -816,71 +806,6 @@ def _robots(members: Sequence[Member], robots: Sequence[Robot], costs: Costs) ->
     return f'{table(_ROBOT_HEADS, rows, "Robots")}<p class="hint">{hint}</p>'
 
 
-@dataclass(frozen=True)
-class _Shown:
-    """Money of a robot or of several in the columns of the table, as parts of the row of all; ""
-    where it is rounded by itself. parts: of what is left.
-    """
-
-    now: str = ""
-    reached: str = ""
-    left: str = ""
-    parts: tuple[str, ...] = ()
-
-
-_ALONE = _Shown()
-
-
-def _adding_up(
-    groups: Sequence[Sequence[Robot]], members: Sequence[Member], costs: Costs
-) -> list[_Shown]:
-    """Of each row of the table, each row robots of its own."""
-    summed = [[robot for robot in group if not robot.drives_only] for group in groups]
-    everyone = [robot for group in summed for robot in group]
-    if len(everyone) < len(summed):
-        summed = [group for group in summed if group]
-    columns = []
-    for of in (_now_of, _reached_of, _left_of):
-        parts = [of(group, members, costs) for group in summed]
-        columns.append(_parts_shown(parts, of(everyone, members, costs), costs))
-    shown = iter(
-        _Shown(now[0], reached[0], left[0], tuple(left[1]))
-        for now, reached, left in zip(*columns, strict=True)
-    )
-    return [next(shown) if any(not r.drives_only for r in group) else _ALONE for group in groups]
-
-
-def _parts_shown(
-    groups: Sequence[Sequence[Amount]], total: Sequence[Amount], costs: Costs
-) -> list[tuple[str, list[str]]]:
-    """Each group of amounts as parts of a total; "" where they are none, as it is open of one."""
-    values = [[amount.value for amount in group] for group in groups]
-    whole = sum_of(total) if total else Amount.of_value(0.0)
-    known = math.fsum(value for group in values for value in group)
-    if not math.isclose(known, whole.value, rel_tol=1e-9):
-        return [("", []) for _ in groups]
-    found = groups_adding_up(values, costs.currency, larger_end(whole))
-    return [each if values[k] else ("", []) for k, each in enumerate(found)]
-
-
-def _now_of(robots: Sequence[Robot], _: Sequence[Member], costs: Costs) -> list[Amount]:
-    return [sum_of([robot.now for robot in robots]).of(costs.money)] if robots else []
-
-
-def _reached_of(robots: Sequence[Robot], _: Sequence[Member], costs: Costs) -> list[Amount]:
-    """None where nothing is reached, or it is open, or more was taken."""
-    reached = [robot.reached for robot in robots if robot.reached is not None]
-    saved = sum_of(reached) if reached else None
-    if saved is None or saved.doubt or saved.value < 0.0:
-        return []
-    return [Amount.of_value(costs.money(saved.value))]
-
-
-def _left_of(robots: Sequence[Robot], members: Sequence[Member], costs: Costs) -> list[Amount]:
-    known = [member for robot in robots for member in _own(members, robot)]
-    return [money for money, _ in _parts_left(robots, _idle_saving(known, costs), costs)]
-
-
 def _all_robots(members: Sequence[Member], robots: Sequence[Robot], costs: Costs) -> str:
     """Every robot, folded; "" where the first table has them."""
     if len(robots) <= _MOST_ROBOTS:
@@ -890,9 +815,7 @@ def _all_robots(members: Sequence[Member], robots: Sequence[Robot], costs: Costs
     return folded(_section(name, table(_ROBOT_HEADS, rows, name)))
 
 
-def _robot_row(
-    robot: Robot, members: Sequence[Member], costs: Costs, shown: _Shown = _ALONE
-) -> tuple[str, ...]:
+def _robot_row(robot: Robot, members: Sequence[Member], costs: Costs) -> tuple[str, ...]:
     own = _own(members, robot)
     idle = None if robot.drives_only else _idle_saving(own, costs)
     part = robot.joules / costs.parts_per_cycle
@@ -904,9 +827,9 @@ def _robot_row(
     today = f"<small>{COMMON}, predicted</small>" if _stands(robot) else ""
     return (
         f"{text(robot.name)}<small>{text(made)}</small><small>{text(each)}</small>",
-        f"{_yearly(robot.now, costs, shown.now)}{today}",
-        _saved(robot.reached, costs, shown.reached),
-        _left([robot], idle, costs, shown),
+        f"{_yearly(robot.now, costs)}{today}",
+        _saved(robot.reached, costs),
+        _left([robot], idle, costs),
         text(_first_lever(robot, own, idle, costs)),
     )
 
@@ -927,19 +850,14 @@ def _first_lever(robot: Robot, own: Sequence[Member], idle: IdleSaving | None, c
     return max(found)[1] if found else DASH
 
 
-def _sums(
-    robots: Sequence[Robot],
-    members: Sequence[Member],
-    costs: Costs,
-    shown: _Shown = _ALONE,
-) -> tuple[str, ...]:
+def _sums(robots: Sequence[Robot], members: Sequence[Member], costs: Costs) -> tuple[str, ...]:
     """Costs, energy and savings of several robots."""
     reached = [robot.reached for robot in robots if robot.reached is not None]
     known = [member for robot in robots for member in _own(members, robot)]
     return (
-        _yearly(sum_of([robot.now for robot in robots]), costs, shown.now),
-        _saved(sum_of(reached) if reached else None, costs, shown.reached),
-        _left(robots, _idle_saving(known, costs), costs, shown),
+        _yearly(sum_of([robot.now for robot in robots]), costs),
+        _saved(sum_of(reached) if reached else None, costs),
+        _left(robots, _idle_saving(known, costs), costs),
     )
 
 
@@ -953,9 +871,9 @@ def _parts_left(
     open_plans = sum_of(plans).of(costs.money) if plans else None
     parts = []
     if idle is not None:
-        parts.append((idle.money, _NIGHTS))
+        parts.append((idle.money, "at night"))
     if open_plans is not None and open_plans.value > 0.0 and not open_plans.doubt:
-        parts.append((open_plans, "by its plan" if len(robots) == 1 else _PLANS))
+        parts.append((open_plans, "by its plan" if len(robots) == 1 else "by plans"))
     above = costs.money(sum(robot.above for robot in robots))
     if abs(above) >= NOTHING:
         parts.append(
@@ -964,37 +882,14 @@ def _parts_left(
     return parts
 
 
-_NIGHTS = "at night"
-_PLANS = "by plans"
-
-
-def _left_shown(robots: Sequence[Robot], idle: IdleSaving | None, costs: Costs) -> dict[str, str]:
-    """What is still to save of all robots, as the row of all has it: by its words."""
-    summed = [robot for robot in robots if not robot.drives_only]
-    parts = _parts_left(summed, idle, costs)
-    if not parts:
-        return {}
-    whole = sum_of([money for money, _ in parts])
-    values = adding_up([money.value for money, _ in parts], costs.currency, larger_end(whole))
-    found = {words: value for value, (_, words) in zip(values, parts, strict=True)}
-    if len(summed) == 1 and "by its plan" in found:
-        found[_PLANS] = found["by its plan"]
-    return found
-
-
-def _left(
-    robots: Sequence[Robot], idle: IdleSaving | None, costs: Costs, shown: _Shown = _ALONE
-) -> str:
+def _left(robots: Sequence[Robot], idle: IdleSaving | None, costs: Costs) -> str:
     """The same together, and each."""
     parts = _parts_left(robots, idle, costs)
     if not parts:
         return DASH
     whole = sum_of([money for money, _ in parts])
-    values = shown.parts or adding_up(
-        [money.value for money, _ in parts], costs.currency, larger_end(whole)
-    )
-    named = [f"{value} {words}" for value, (_, words) in zip(values, parts, strict=True)]
-    return f"{_money(whole, costs, shown.left)}<small>{text(', '.join(named))}</small>"
+    named = [f"{yearly_money(money.value, costs.currency)} {words}" for money, words in parts]
+    return f"{_money(whole, costs)}<small>{text(', '.join(named))}</small>"
 
 
 _NAMED = 5  # robots in a sentence
@@ -1040,12 +935,11 @@ def _around_the_clock(members: Sequence[Member], robots: Sequence[Robot], costs:
         rows.append(_clock_row("<b>all</b>", _sum_of_demands(demands), sums, costs))
     heads = ("robot", ">largest quarter of an hour", *(f">{_rest_head(mode)}" for mode in modes))
     saves = _idle_saving(members, costs)
-    left = _left_shown(robots, saves, costs)
     hint = (
         f"{significant(costs.idle_hours, 6)} hours a year lie outside of the shifts; the columns "
         "of modes say what rest takes in them, by the data. The peak of all robots is the sum of "
         f"theirs: as if all came at once; it is on the basis of the bill ({_as_now(robots)}). "
-        f"{DEMAND_LEAVES_OUT} {idle_sentence(saves, costs, left.get(_NIGHTS, ''))}"
+        f"{DEMAND_LEAVES_OUT} {idle_sentence(saves, costs)}"
     )
     return f'<p class="hint">{text(hint)}</p>{table(heads, rows, "Peak and rest")}'
 
@@ -1130,14 +1024,14 @@ def _shown(name: str) -> str:
     return name.replace("_", " ").lower() if name.isupper() else modes_as_words(name)
 
 
-def _yearly(amount: Amount, costs: Costs, shown: str = "") -> str:
-    """Price of a year with its interval, and its energy; shown: as a part of a sum."""
+def _yearly(amount: Amount, costs: Costs) -> str:
+    """Price of a year with its interval, and its energy."""
     energy = f"<small>{text(kilowatt_hours(amount.value))}</small>"
-    return f"{_money(amount.of(costs.money), costs, shown)}{energy}"
+    return f"{_money(amount.of(costs.money), costs)}{energy}"
 
 
-def _money(price: Amount, costs: Costs, shown: str = "") -> str:
-    value = shown or money_of(price, costs.currency)
+def _money(price: Amount, costs: Costs) -> str:
+    value = yearly_money(price.value, costs.currency)
     return f"<b>{text(value)}</b>{_small_ends(price, costs)}"
 
 
@@ -1148,17 +1042,15 @@ def _small_ends(price: Amount, costs: Costs) -> str:
     return f"<small>{text(ends)} {text(costs.currency)}</small>"
 
 
-def _saved(amount: Amount | None, costs: Costs, shown: str = "") -> str:
-    """What is saved, with its interval; where zero lies in it, that it is open. shown: as a part of
-    a sum.
-    """
+def _saved(amount: Amount | None, costs: Costs) -> str:
+    """What is saved, with its interval; where zero lies in it, that it is open."""
     if amount is None:
         return DASH
     word, amount = amount.gain()
     between = _small_ends(amount.of(costs.money), costs)
     if amount.doubt:
         return f'<span title="{text(amount.doubt)}">open</span>{between}'
-    price = shown or yearly_money(costs.money(amount.value), costs.currency)
+    price = yearly_money(costs.money(amount.value), costs.currency)
     energy = f"{kilowatt_hours(amount.value)}{' more' if word == 'more' else ''}"
     return f"<b>{text(price)}</b><small>{text(energy)}</small>{between}"
 
@@ -1215,8 +1107,6 @@ def _potential(members: Sequence[Member], robots: Sequence[Robot], costs: Costs)
         for name, own in by_measure(members, costs).items()
     ]
     found += [*_night(members, robots, costs), *_of_plans(robots, costs)]
-    left = _left_shown(robots, _idle_saving(members, costs), costs)
-    as_part = {_NIGHT_ROW: left.get(_NIGHTS), _PLAN_ROW: left.get(_PLANS)}
     if not found:
         return '<p class="empty">No recording says it.</p>'
     found.sort(key=lambda measure: -measure[0])
@@ -1224,8 +1114,8 @@ def _potential(members: Sequence[Member], robots: Sequence[Robot], costs: Costs)
     rows = [
         (
             f"{name}{_most_at(own)}",
-            f"<b>{text(as_part.get(name.partition('<')[0]) or yearly_money(price, costs.currency))}"
-            f"</b><small>{text(yearly_kilowatt_hours(sum(own.values())))}</small>",
+            f"<b>{text(yearly_money(price, costs.currency))}</b>"
+            f"<small>{text(yearly_kilowatt_hours(sum(own.values())))}</small>",
             bar(price, most, "planned"),
         )
         for price, name, own in found
@@ -1242,8 +1132,6 @@ def _potential(members: Sequence[Member], robots: Sequence[Robot], costs: Costs)
     return f'{table(heads, rows, "What could still be saved", COMPACT)}<p class="hint">{hint}</p>'
 
 
-_NIGHT_ROW = "at night and at weekends"
-_PLAN_ROW = "plans that nobody drove"
 _MORE = 1.05  # times what the next one saves: else none saves most
 
 
@@ -1266,7 +1154,7 @@ def _night(
     energies = {name: idle.energy.value for name, idle in own.items() if idle is not None}
     ends = f"{yearly_span(nights.money.low, nights.money.high, costs.currency)} {costs.currency}"
     basis = f"{nights.mode} instead of closed brakes, {nights.basis}, 90 % interval {ends}"
-    name = f"{_NIGHT_ROW}<small>{text(basis)}</small>"
+    name = f"at night and at weekends<small>{text(basis)}</small>"
     return [(nights.saved, name, energies)]
 
 
@@ -1284,7 +1172,7 @@ def _of_plans(
         words += f", {between_of(plans.of(costs.money), costs)}" if plans.low < plans.high else ""
         if plans.value > 0.0 and not plans.doubt:
             energies = {name: saved.value for name, saved in undriven.items()}
-            name = f"{_PLAN_ROW}<small>{text(words)}</small>"
+            name = f"plans that nobody drove<small>{text(words)}</small>"
             found.append((costs.money(plans.value), name, energies))
     above = {robot.name: robot.above for robot in robots if robot.reached is not None}
     total = costs.money(sum(above.values()))

@@ -41,7 +41,7 @@ from ir_recorder.report.costs import (
     recorded_idle_saving,
 )
 from ir_recorder.report.methods import counted
-from ir_recorder.report.money_text import adding_up, yearly_money
+from ir_recorder.report.money_text import yearly_money
 from ir_recorder.report.number_text import (
     interval,
     kilograms,
@@ -68,7 +68,6 @@ from ir_recorder.report.paid import (
     counted_at,
     first_steps,
     reached_saving,
-    saved_parts,
 )
 
 _STYLES = {Verdict.HOLDS: "good", Verdict.FAILS: "bad", Verdict.NOT_CHECKED: "open"}
@@ -254,18 +253,6 @@ def answer(analysis: Analysis, costs: Costs) -> str:
     return paid.answer(costs, steps, part).html() + paid.picture(costs)
 
 
-def nights_as_part(analysis: Analysis, costs: Costs) -> str:
-    """What nights save, as the steps of a plan that was not driven have it; "" by itself."""
-    cycle = production_of(analysis)
-    if cycle is None or cycle.savings is None or analysis.program is not None:
-        return ""
-    paid = _paid(analysis, costs)
-    count = costs.cycles_per_year(cycle.pace)
-    parts = (cycle.savings.movements, cycle.savings.pauses)
-    plan = [costs.money(saved_amount(saving).value * count) for saving in parts]
-    return saved_parts(plan, paid.idle, paid.year(costs).money, costs)[0]
-
-
 def _without_saving(analysis: Analysis, cycle: Production, paid: Paid, costs: Costs) -> Answer:
     """What a year costs, where nobody knows what a plan saves of it."""
     energy = costs.energy_of_year(cycle)
@@ -328,7 +315,7 @@ def year_in_words(
     rest, how = (
         (idle.deepest, f"in {idle.mode}") if planned else (idle.left_alone, "on closed brakes")
     )
-    inside, outside = adding_up((shifts, rest), costs.currency)
+    inside, outside = (yearly_money(each, costs.currency) for each in (shifts, rest))
     return (
         f"{yearly_money(shifts + rest, costs.currency)} a year",
         f"{inside} in shifts ({taken}), {outside} at night and at weekends, {how}.",

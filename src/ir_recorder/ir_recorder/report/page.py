@@ -29,7 +29,6 @@ from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import (
     answer,
     failing,
-    nights_as_part,
     notes,
     only_proved,
     run_tiles,
@@ -125,7 +124,7 @@ def report_html(
     controller = load_power_data() if analysis.cell is None else analysis.cell.robot.controller
     planned = analysis.recording.only_planned
     cycle = costs_section(analysis, prices)
-    rest = clock_section(analysis, prices, nights_as_part(analysis, prices))
+    rest = clock_section(analysis, prices)
     parts = {
         "title": text(f"{name}: {_subject(analysis)}"),
         "name": text(f"{name}: {_subject(analysis)}"),

@@ -4,7 +4,6 @@ it, what rest outside of the shifts saves, and both together.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -25,11 +24,7 @@ from ir_recorder.report.costs import (
 )
 from ir_recorder.report.money_text import (
     NOTHING,
-    adding_up,
-    groups_adding_up,
-    larger_end,
     money,
-    money_of,
     price_field,
     yearly_money,
     yearly_span,
@@ -130,14 +125,13 @@ class Paid:
         if reached is not None:
             result = self.reached_words(costs)
         words = "; ".join(each for each in said if each)
-        parts = saved_parts([money.value for money, _ in steps], self.idle, year.money, costs)
         own = [f"{step}, predicted" for step in first_steps(steps, None, costs)]
         nights = first_steps(self._above_steps(costs), self.idle, costs)
         return Answer(
             result,
             f"{words[0].upper()}{words[1:]}.",
             self.sure(costs, self._above(costs)),
-            nights if reached is not None else first_steps(steps, self.idle, costs, parts) or KEEP,
+            nights if reached is not None else first_steps(steps, self.idle, costs) or KEEP,
             [*_of_parts(part, costs), *a_night(self.idle, costs)],
             self.between_words(costs),
             own if reached is not None else (),
@@ -382,48 +376,16 @@ Step = tuple[Amount, str]
 _FEW = 3  # to do, at the top of a page
 
 
-def first_steps(
-    steps: Sequence[Step],
-    idle: IdleSaving | None,
-    costs: Costs,
-    shown: SavedParts = ("", ()),
-) -> list[str]:
-    """The steps that save most, and rest outside of the shifts among them; shown: as parts of what
-    is saved in all.
-    """
-    own = [*shown[1], *[""] * len(steps)]
-    found = [
-        (money, words, each)
-        for (money, words), each in zip(steps, own, strict=False)
-        if money.value >= _WORTH
-    ]
+def first_steps(steps: Sequence[Step], idle: IdleSaving | None, costs: Costs) -> list[str]:
+    """The steps that save most, and rest outside of the shifts among them."""
+    found = [(money, words) for money, words in steps if money.value >= _WORTH]
     if idle is not None:
-        found.append((idle.money, at_night(idle), shown[0]))
+        found.append((idle.money, at_night(idle)))
     found.sort(key=lambda step: -step[0].value)
     return [
-        f"{words[0].upper()}{words[1:]}: {with_span(money, costs, each)} a year"
-        for money, words, each in found[:_FEW]
+        f"{words[0].upper()}{words[1:]}: {with_span(money, costs)} a year"
+        for money, words in found[:_FEW]
     ]
-
-
-SavedParts = tuple[str, Sequence[str]]
-"""What is shown of nights and of each part of a plan's saving: "" and () by themselves."""
-
-
-def saved_parts(
-    plan: Sequence[float], idle: IdleSaving | None, year: Amount, costs: Costs
-) -> SavedParts:
-    """Parts of what a plan saves, and nights, so that they add up to a year as it is shown; by
-    themselves where they are not all of it.
-    """
-    nights = [] if idle is None else [idle.saved]
-    whole = math.fsum([*plan, *nights])
-    if not plan or not nights or year.value <= 0.0:
-        return "", ()
-    if not math.isclose(whole, year.value, rel_tol=1e-9):
-        return "", ()
-    of_plan, outside = groups_adding_up([plan, nights], costs.currency, larger_end(year))
-    return outside[0], of_plan[1]
 
 
 def at_night(idle: IdleSaving) -> str:
@@ -434,9 +396,9 @@ def at_night(idle: IdleSaving) -> str:
     )
 
 
-def with_span(money: Amount, costs: Costs, shown: str = "") -> str:
-    """An amount of a year, its 90 % interval in brackets; shown: as a part of a sum."""
-    shown = shown or money_of(money, costs.currency)
+def with_span(money: Amount, costs: Costs) -> str:
+    """An amount of a year, its 90 % interval in brackets."""
+    shown = yearly_money(money.value, costs.currency)
     return (
         f"{shown} ({yearly_span(money.low, money.high, costs.currency)})"
         if money.low < money.high
@@ -489,7 +451,7 @@ def _year_row(
     """A bar of a year: money in shifts, and outside of them; rests: how, in words, which belongs
     to the name, as the same program with other nights is another year.
     """
-    shifts, nights = adding_up(money, costs.currency)
+    shifts, nights = (yearly_money(each, costs.currency) for each in money)
     pieces = [Piece(style, "in shifts", money[0])]
     parts = ""
     if money[1] > 0.0:

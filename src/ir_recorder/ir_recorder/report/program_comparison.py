@@ -41,7 +41,7 @@ from ir_recorder.report.costs import (
     share_between,
 )
 from ir_recorder.report.files import write_output
-from ir_recorder.report.money_text import adding_up, larger_end, money_of, yearly_money, yearly_span
+from ir_recorder.report.money_text import yearly_money, yearly_span
 from ir_recorder.report.motion_scene import common_rests, in_step, motion_of, power_curves, rests_of
 from ir_recorder.report.number_text import (
     DASH,
@@ -57,16 +57,7 @@ from ir_recorder.report.number_text import (
     watts,
 )
 from ir_recorder.report.page import PAGE_START, asset, filled, folded
-from ir_recorder.report.paid import (
-    MOVEMENTS,
-    PAUSES,
-    Before,
-    Paid,
-    Tile,
-    at_night,
-    row_of,
-    saved_parts,
-)
+from ir_recorder.report.paid import MOVEMENTS, PAUSES, Before, Paid, Tile, at_night, row_of
 from ir_recorder.report.series import long_rests
 from ir_recorder.report.shell import badge
 from ir_recorder.report.step_table import TableValue, write_columns
@@ -340,21 +331,12 @@ def change_table(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     most = max((price.value for price, _ in priced), default=0.0)
     whole_year = _paid(found, cell, costs).year(costs).money
     rest = whole_year.value - sum(price.value for price, _ in priced)
-    shown = [money_of(price, costs.currency) for price, _ in priced]
-    summed = bool(priced) and whole_year.value > 0.0
-    if summed:
-        plan = [*(price.value for price, _ in priced[idle is not None :]), rest]
-        nights, own = saved_parts(plan, idle, whole_year, costs)
-        alone = adding_up(plan, costs.currency, larger_end(whole_year))
-        shown = [nights, *own] if nights else alone
     rows = [
-        (f"{k}. {where}", *cells, _price(price, costs, own), bar(price.value, most, "planned"))
-        for k, ((price, (where, *cells)), own) in enumerate(
-            zip(priced, shown, strict=False), start=1
-        )
+        (f"{k}. {where}", *cells, _price(price, costs), bar(price.value, most, "planned"))
+        for k, (price, (where, *cells)) in enumerate(priced, start=1)
     ]
-    if summed:
-        other = text(shown[-1])
+    if priced and whole_year.value > 0.0:
+        other = text(yearly_money(rest, costs.currency))
         saved = found.planned.saving.saved
         left = saved - sum(change.saving.saved for change in found.changes)
         cells = (text(watt_hours(left)), other, bar(rest, most, "planned"))
@@ -366,10 +348,10 @@ def change_table(found: BeforeAfter, cell: Cell, costs: Costs) -> str:
     return none + (table(heads, rows, "Changes") if rows else "")
 
 
-def _price(amount: Amount, costs: Costs, shown: str = "") -> str:
-    """Money of a year with its interval; shown: as a part of a sum."""
+def _price(amount: Amount, costs: Costs) -> str:
+    """Money of a year with its interval."""
     ends = f"{yearly_span(amount.low, amount.high, costs.currency)} {costs.currency}"
-    value = shown or money_of(amount, costs.currency)
+    value = yearly_money(amount.value, costs.currency)
     return _cell(value, ends if amount.high > amount.low else "")
 
 

@@ -37,7 +37,6 @@ from ir_recorder.report.costs import (
     following_price,
     idle_saving,
     money_of_thousand,
-    moneys_of_thousand,
     payback,
 )
 from ir_recorder.report.files import write_output
@@ -244,24 +243,23 @@ def _table(analyses: Mapping[str, Analysis], cycle: Production | None, costs: Co
     every = analyses.values()
     span = _whole(analyses)
     parts = [_part(_taken(analysis, span), cycle, costs) for analysis in every]
-    moneys = moneys_of_thousand(parts, costs)
     rows = [
         (
             f'<a href="{text(robot)}.html">{text(robot)}</a>'
             f"<small>{counted(len(analysis.steps), 'step')}</small>",
-            _part_cell(part, money),
+            _part_cell(part, costs),
             watt_hours(driven_joules(analysis)),
             watt_hours(predicted_joules(analysis)),
             seconds(program_span(analysis).seconds),
             seconds(sum(waited(analysis).values())),
             watts(analysis.peak_power),
         )
-        for (robot, analysis), part, money in zip(analyses.items(), parts, moneys, strict=True)
+        for (robot, analysis), part in zip(analyses.items(), parts, strict=True)
     ]
     rows.append(
         (
             f"<b>all together</b><small>{sum(len(a.steps) for a in every)} steps</small>",
-            _part_cell(sum(parts), money_of_thousand(sum(parts), costs)),
+            _part_cell(sum(parts), costs),
             watt_hours(sum(map(driven_joules, every))),
             watt_hours(sum(map(predicted_joules, every))),
             seconds(span.seconds),
@@ -283,11 +281,11 @@ def _part(joules: float, cycle: Production | None, costs: Costs) -> float:
     return np.nan if cycle is None else joules / cycle.cycles / costs.parts_per_cycle
 
 
-def _part_cell(joules: float, money: str) -> str:
+def _part_cell(joules: float, costs: Costs) -> str:
     """Energy and money of a part."""
     if not np.isfinite(joules):
         return DASH
-    return f"<b>{watt_hours(joules)}</b><small>{text(money)}</small>"
+    return f"<b>{watt_hours(joules)}</b><small>{text(money_of_thousand(joules, costs))}</small>"
 
 
 def program_span(analysis: Analysis) -> Span:
