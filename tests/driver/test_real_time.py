@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from itertools import pairwise
 
@@ -238,6 +239,30 @@ def test_the_thread_ticks_on_the_grid() -> None:
     assert enough.wait(PATIENCE)
     thread.close()
     assert {b - a for a, b in pairwise(stamps)} == {PERIOD}
+
+
+def test_a_slow_stream_looks_at_the_clock_when_a_stamp_is_due() -> None:
+    looks: list[int] = []
+    stamps: list[int] = []
+    enough = threading.Event()
+
+    def clock() -> int:
+        looks.append(time.time_ns())
+        return looks[-1]
+
+    def tick(stamp: int) -> None:
+        stamps.append(stamp)
+        if len(stamps) == 20:
+            enough.set()
+
+    thread = GridThread(
+        10 * PERIOD, clock, lambda: SYSTEM, tick, lambda gap: None, lambda error: enough.set()
+    )
+    thread.start()
+    assert enough.wait(PATIENCE)
+    thread.close()
+    # one look finds a stamp due, one how long the next takes, one may wake early
+    assert len(looks) <= 3 * len(stamps)
 
 
 def test_a_clock_that_has_not_started_or_stands_still_makes_no_ticks() -> None:

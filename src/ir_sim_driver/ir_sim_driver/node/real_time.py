@@ -29,18 +29,20 @@ class ClockPolicy:
 
     gap [s]: an advance between two looks that is a gap. lag [s]: a delay that is one, however it
     came about.
-    catch_up: speed in times the clock's, at which delays are made up for.
+    catch_up: speed in times the clock's, at which delays are made up for. nap [s]: between two
+    looks at most, while no stamp is due.
     """
 
     gap: float
     lag: float
     catch_up: float
+    nap: float = 0.002
 
 
-SYSTEM = ClockPolicy(gap=2.0, lag=inf, catch_up=2.0)
+SYSTEM = ClockPolicy(gap=2.0, lag=inf, catch_up=2.0, nap=0.02)
 """The host's clock: a loaded machine lags as long as it is loaded. Two seconds without a look at
 the clock are no load: its threads wait for tenths of one, and for a whole one while a huge message
-is read.
+is read. It says when a stamp is due: to look more often costs a slow stream more than its stamps.
 """
 FOREIGN = ClockPolicy(gap=5.0, lag=5.0, catch_up=inf)
 """Somebody's /clock, which comes in steps and at any speed."""
@@ -123,7 +125,6 @@ class Grid:
 
 # Thread with absolute deadlines.
 
-_POLL = 0.002  # s, while a clock stands still or has not started
 # ns of real time that a scaled clock counts between two looks; more is a suspension
 _STEP_MAX = _NS // 10
 
@@ -181,11 +182,12 @@ class GridThread:
     def _loop(self) -> None:
         grid = self._grid
         while not self._closing.is_set():
-            wait = grid.look(self._clock(), self._wall(), self._policy())
+            policy = self._policy()
+            wait = grid.look(self._clock(), self._wall(), policy)
             if grid.gap:
                 self._on_gap(grid.gap)
             if wait > 0:
-                time.sleep(min(wait / _NS, _POLL))
+                time.sleep(min(wait / _NS, policy.nap))
             else:
                 self.worst_lag = max(self.worst_lag, grid.lag)
                 self._tick(grid.take())
