@@ -50,7 +50,7 @@ PATIENCE = 30.0
 BACK = 1.5  # s of the goal that brings the robot home
 PLC = ("conf_mess", "drives_on", "drives_off", "move_enable", "ab", "end_rest", "aut")
 SHORT = {
-    "joint_state_rate": 100,
+    "joint_state_rate": 50,
     "modbus_idle": "3600.0",  # the ways are drawn: on a busy machine none is silent for too long
     "transitions.bus_power_off_enter": "0.05",
     "transitions.bus_power_off_leave": "0.05",
@@ -185,13 +185,13 @@ class Cell:
         self._mark = self.q
 
     def stands(self) -> bool:
-        """Wait until the robot stands: six messages of after this call say so."""
+        """Wait until the robot stands: three messages of after this call, 60 ms, say so."""
         ends = time.monotonic() + ROLLS
         while time.monotonic() < ends:
             now = time.time_ns()
             self.wait(lambda now=now: self.stamp >= now)
             self.mark()
-            self.frames(6)
+            self.frames(3)
             if not self.moved:
                 return True
         return False
@@ -364,7 +364,7 @@ def episode(cell: Cell, generator: random.Random) -> None:
     _holds(cell.run(), f"no recovery: mode {cell.mode}")
     # when all have a result nothing is left that could move; the topic gives none
     _holds(cell.ended() is not None, "a goal has no result")
-    cell.frames(generator.choice((2, 5, 20)))
+    cell.frames(generator.choice((1, 3, 10)))
     _stands(cell, "after the recovery, by what came before")
     _holds(cell.wait(lambda: not cell.latched), "the driver says that the stop is still latched")
     if generator.random() < 0.1:
