@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from rclpy.action import CancelResponse
+from rclpy.action import ActionClient, CancelResponse
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 
@@ -287,6 +287,39 @@ def test_a_goal_whose_node_dies_is_given_up(client, cell, ros_executor, monkeypa
         ServiceUnavailableError, match=r"that ran ir_program_runner/run_program has gone"
     ):
         client.run_program("endless", progress=lambda at: ros_executor.run(cell.runner.destroy))
+
+
+def test_a_goal_outlasts_a_suspension_of_its_client(client, cell, monkeypatch):
+    """The first look afterwards finds nobody, as the middleware has forgotten both; the next one
+    finds the node again. A goal that were given up then would go on without anybody.
+    """
+    monkeypatch.setattr(client_module, "GONE", 1.0)  # looks more often
+    given_up = Cancellation()
+    ahead = [0.0]
+    looks = []
+
+    class Clock:
+        @staticmethod
+        def monotonic():
+            return time.monotonic() + ahead[0]
+
+    def is_ready(self):
+        looks.append(self)
+        if len(looks) == 1:
+            ahead[0] = 60.0
+        if len(looks) == 3:
+            given_up.cancel()  # a test has no other way to an end
+        return len(looks) != 2
+
+    def suspend(at):
+        monkeypatch.setattr(ActionClient, "server_is_ready", is_ready)
+
+    monkeypatch.setattr(client_module, "time", Clock)
+    with pytest.raises(RequestRefusedError) as caught:
+        client.run_program("endless", progress=suspend, give_up=given_up)
+    assert caught.value.code == -7
+    assert cell.canceled.is_set()
+    assert len(looks) >= 3
 
 
 def test_a_failing_progress_callback_reaches_the_script_and_cancels_the_goal(

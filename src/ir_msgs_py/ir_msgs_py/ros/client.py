@@ -142,7 +142,8 @@ def _chosen(types: Sequence[str]) -> str:
 
 GONE = 10.0
 """s without anybody who offers an action before its goal is given up. The middleware forgets a
-process that died, or was stopped, after 5 s.
+process that died, or was stopped, after 5 s. Time in which this process was suspended is none of
+it: the first look afterwards finds nobody, and those who have forgotten it come back in moments.
 """
 FORGOTTEN = 4.0
 """s between two looks at an action's node, after which one may have forgotten the other."""
@@ -239,6 +240,8 @@ class GoalSender:
         now = time.monotonic()
         deadline = now + timeout
         seen = now
+        looked = now
+        missing = 0.0
         patience = FORGOTTEN
         asked = now
         while not self._executor.wait(result, min(0.1 * GONE, deadline - now), give_up):
@@ -253,10 +256,14 @@ class GoalSender:
                     asked = now
                     patience = min(2.0 * patience, _RARELY)
                 seen = now
-            elif now - seen >= GONE:
-                raise ServiceUnavailableError(
-                    f"the node that ran {action} has gone: no result will come"
-                )
+                missing = 0.0
+            else:
+                missing += min(now - looked, 0.2 * GONE)  # two looks; more is a suspension
+                if missing >= GONE:
+                    raise ServiceUnavailableError(
+                        f"the node that ran {action} has gone: no result will come"
+                    )
+            looked = now
             if now >= deadline:
                 return False
         return True
