@@ -12,7 +12,7 @@ from ir_description import load_power_data
 from ir_msgs_py.options import PlanOptions
 from ir_planner import Planner
 from ir_recorder.analysis.production import Amount
-from ir_recorder.report.costs import Costs
+from ir_recorder.report.prices import Costs
 from ir_recorder.report.whole_line import WholeLine, of_whole_line
 
 TOURS = {

@@ -14,10 +14,10 @@ from ir_msgs_py.savings import BeforeAfter
 from ir_planner import Planner
 from ir_planner.before_after import before_after_common
 from ir_recorder.analysis.production import Amount
-from ir_recorder.report.costs import Costs
+from ir_recorder.report.before_after import Year, year_of
 from ir_recorder.report.money_text import money
 from ir_recorder.report.number_text import millimetres, seconds, significant
-from ir_recorder.report.program_comparison import Year, year_of
+from ir_recorder.report.prices import Costs
 
 PAGE = Path(__file__).resolve().parents[1] / "README.md"
 PEERS = PAGE.parent / "docs" / "planning.md"

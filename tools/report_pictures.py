@@ -21,7 +21,7 @@ from ir_planner import Planner
 from ir_planner.before_after import before_after_common
 from ir_recorder import Analysis, analyse, findings, read_recording
 from ir_recorder.report import write_report
-from ir_recorder.report.program_comparison import write_before_after
+from ir_recorder.report.before_after import write_before_after
 
 PAPER = (740, 1094)  # px at 96 dpi: A4 less the margins of the page's style
 

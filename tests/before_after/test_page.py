@@ -18,7 +18,13 @@ from ir_cli.main import main
 from ir_msgs_py.savings import BeforeAfter, Saving
 from ir_planner import Planner
 from ir_recorder.analysis.production import home_watts
-from ir_recorder.report.costs import J_PER_KWH, Costs
+from ir_recorder.report.before_after import (
+    before_after_columns,
+    before_after_html,
+    quarter_of,
+    write_before_after_table,
+    year_of,
+)
 from ir_recorder.report.money_text import money
 from ir_recorder.report.motion_scene import common_rests, in_step
 from ir_recorder.report.number_text import (
@@ -28,13 +34,7 @@ from ir_recorder.report.number_text import (
     span_of,
     watts,
 )
-from ir_recorder.report.program_comparison import (
-    before_after_columns,
-    before_after_html,
-    quarter_of,
-    write_before_after_table,
-    year_of,
-)
+from ir_recorder.report.prices import J_PER_KWH, Costs
 
 
 def data_of(page: str) -> dict:

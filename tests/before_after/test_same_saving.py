@@ -13,9 +13,9 @@ from ir_planner import Planner, ProgramPlan
 from ir_recorder import analyse, findings, read_recording
 from ir_recorder.analysis.production import production_of
 from ir_recorder.report import report_html
-from ir_recorder.report.costs import Costs
+from ir_recorder.report.before_after import before_after_html, quarter_of, year_of
 from ir_recorder.report.money_text import yearly_money
-from ir_recorder.report.program_comparison import before_after_html, quarter_of, year_of
+from ir_recorder.report.prices import Costs
 
 
 @pytest.mark.long

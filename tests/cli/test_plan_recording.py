@@ -22,8 +22,8 @@ from ir_recorder import Analysis, Verdict, analyse, findings, read_recording, su
 from ir_recorder.analysis.production import planned_interval, production_of
 from ir_recorder.reading.mcap_file import RawRecording, read_raw
 from ir_recorder.report import report_html
-from ir_recorder.report.compare import comparison_html
 from ir_recorder.report.number_text import joules, kilowatt_hours
+from ir_recorder.report.side_by_side import comparison_html
 
 
 def assert_planned_figures_are_those_of_the_answer(analysis: Analysis, raw: RawRecording) -> None:

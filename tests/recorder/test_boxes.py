@@ -23,10 +23,11 @@ from ir_planner import Planner
 from ir_planner.before_after import before_after_common
 from ir_recorder import Analysis, analyse, findings
 from ir_recorder.report import report_html
-from ir_recorder.report.compare import comparison_html
-from ir_recorder.report.fleet import fleet_html, member_of
-from ir_recorder.report.program_comparison import before_after_html
+from ir_recorder.report.before_after import before_after_html
+from ir_recorder.report.fleet import fleet_html
+from ir_recorder.report.fleet_members import member_of
 from ir_recorder.report.robots import robots_html
+from ir_recorder.report.side_by_side import comparison_html
 from ir_studies.arena.figures import ArenaRun
 from ir_studies.arena.page import page_html as arena_html
 from ir_studies.arena.settings import ArenaEntry, ArenaSettings

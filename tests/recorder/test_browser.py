@@ -23,7 +23,7 @@ from ir_recorder.live import LiveServer, Stream
 from ir_recorder.live.cell_view import CellView, ReceivedCell
 from ir_recorder.live.server import ButtonAnswer
 from ir_recorder.report import report_html
-from ir_recorder.report.compare import comparison_html
+from ir_recorder.report.side_by_side import comparison_html
 from ir_studies.statistics.findings import findings_of
 from ir_studies.statistics.outputs import page_html as statistics_html
 from ir_studies.statistics.settings import StatisticsSettings

@@ -26,26 +26,17 @@ from ir_recorder.analysis.production import (
 )
 from ir_recorder.errors import RecorderError
 from ir_recorder.report import report_html
-from ir_recorder.report.compare import comparison_html
-from ir_recorder.report.costs import (
-    NAMES,
-    Costs,
-    assumed_section,
-    clock_section,
-    costs_section,
-    counted_with,
-    demand_of,
-    idle_saving,
-    lever_section,
-    payback,
-    read_costs,
-    recorded_demand,
-    recorded_idle_saving,
-)
-from ir_recorder.report.fleet import fleet_html, fleet_of_line, member_of
+from ir_recorder.report.cycle_costs import costs_section, lever_section, payback
+from ir_recorder.report.fleet import fleet_html
+from ir_recorder.report.fleet_figures import fleet_of_line
+from ir_recorder.report.fleet_members import member_of
 from ir_recorder.report.money_text import money, yearly_money, yearly_span
+from ir_recorder.report.nights import clock_section, idle_saving, recorded_idle_saving
 from ir_recorder.report.number_text import kilograms, kilowatt_hours, watts
 from ir_recorder.report.paid import with_span
+from ir_recorder.report.prices import NAMES, Costs, assumed_section, counted_with, read_costs
+from ir_recorder.report.quarter_hour import demand_of, recorded_demand
+from ir_recorder.report.side_by_side import comparison_html
 from ir_values.settings import settings_table
 
 GIVEN = """format: ir_costs/1

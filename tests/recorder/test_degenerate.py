@@ -20,10 +20,11 @@ from ir_recorder import Analysis, analyse, findings
 from ir_recorder.analysis.production import production_of
 from ir_recorder.reading.recording import Recording
 from ir_recorder.report import report_html
-from ir_recorder.report.compare import comparison_html
-from ir_recorder.report.fleet import fleet_html, member_of
+from ir_recorder.report.fleet import fleet_html
+from ir_recorder.report.fleet_members import member_of
 from ir_recorder.report.money_text import money
 from ir_recorder.report.number_text import joules, kilowatt_hours, millimetres, number, watts
+from ir_recorder.report.side_by_side import comparison_html
 
 LACKING = (
     {"power": None},

@@ -17,20 +17,17 @@ from pyarrow import parquet
 from ir_cli.main import main
 from ir_recorder import Analysis
 from ir_recorder.analysis.production import PREDICTED
-from ir_recorder.report.costs import Costs
-from ir_recorder.report.fleet import (
+from ir_recorder.report.fleet import fleet_html
+from ir_recorder.report.fleet_figures import by_measure, by_mode, by_movement, robots_of
+from ir_recorder.report.fleet_members import (
     Member,
-    by_measure,
-    by_mode,
-    by_movement,
     fleet_columns,
-    fleet_html,
     member_of,
     read_members,
     recordings_below,
-    robots_of,
     write_fleet_table,
 )
+from ir_recorder.report.prices import Costs
 from ir_values.files import FileRoots
 
 

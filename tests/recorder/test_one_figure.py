@@ -26,11 +26,13 @@ from ir_recorder.analysis.predicted_power import (
 from ir_recorder.analysis.production import demand_watts, levers, production_of, stretches
 from ir_recorder.analysis.results import FullPause
 from ir_recorder.report import report_html
-from ir_recorder.report.compare import comparison_html
-from ir_recorder.report.costs import J_PER_KWH, Costs
-from ir_recorder.report.fleet import by_mode, fleet_columns, fleet_html, member_of, robots_of
+from ir_recorder.report.fleet import fleet_html
+from ir_recorder.report.fleet_figures import by_mode, robots_of
+from ir_recorder.report.fleet_members import fleet_columns, member_of
 from ir_recorder.report.money_text import money, yearly_money
 from ir_recorder.report.number_text import kilowatt_hours, yearly_kilowatt_hours
+from ir_recorder.report.prices import J_PER_KWH, Costs
+from ir_recorder.report.side_by_side import comparison_html
 
 PAUSES = ("", "600 s, 1800 s", "5 s, 7 s", "60 s")
 

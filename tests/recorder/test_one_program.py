@@ -17,11 +17,13 @@ from ir_recorder import Analysis, analyse, findings
 from ir_recorder.analysis.production import SLOWER, demand_watts, production_of
 from ir_recorder.reading.recording import SavingsEvent
 from ir_recorder.report import report_html
-from ir_recorder.report.compare import comparison_html
-from ir_recorder.report.costs import Costs, recorded_idle_saving
-from ir_recorder.report.fleet import fleet_columns, fleet_html, member_of
+from ir_recorder.report.fleet import fleet_html
+from ir_recorder.report.fleet_members import fleet_columns, member_of
 from ir_recorder.report.money_text import yearly_money
+from ir_recorder.report.nights import recorded_idle_saving
 from ir_recorder.report.number_text import joules, kilowatt_hours, percent, seconds
+from ir_recorder.report.prices import Costs
+from ir_recorder.report.side_by_side import comparison_html
 
 SHORTENED = (("unshortened_pauses", "600 s, 1800 s"),)
 SHEET = "from the data sheet, not measured"

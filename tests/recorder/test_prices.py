@@ -17,11 +17,12 @@ import pytest
 from ir_recorder import Analysis, findings
 from ir_recorder.analysis.production import PREDICTED
 from ir_recorder.report import report_html
-from ir_recorder.report.compare import comparison_html
-from ir_recorder.report.costs import Costs
-from ir_recorder.report.fleet import Member, fleet_html, member_of
+from ir_recorder.report.fleet import fleet_html
+from ir_recorder.report.fleet_members import Member, member_of
 from ir_recorder.report.money_text import Repriced, money, with_elements, yearly_money
+from ir_recorder.report.prices import Costs
 from ir_recorder.report.robots import robots_html
+from ir_recorder.report.side_by_side import comparison_html
 
 TYPED = (0.31, 0.087, 1.9)
 AMOUNTS = "[...document.querySelectorAll('data[value]')].map((each) => each.textContent)"

@@ -68,3 +68,11 @@ def test_a_room_has_a_first_line_and_shows_what_may_be_used(room: str) -> None:
     assert module.__doc__
     assert module.__all__ == sorted(module.__all__)
     assert all(hasattr(module, name) for name in module.__all__)
+
+
+def test_the_reports_room_names_its_modules() -> None:
+    """A stranger who looks for a page finds there which module makes it."""
+    folder = FOLDER / "report"
+    said = import_module("ir_recorder.report").__doc__ or ""
+    modules = {path.stem for path in folder.glob("*.py")} - {"__init__"}
+    assert {name for name in modules if f"`{name}`" not in said} == set()

@@ -21,9 +21,9 @@ from ir_planner.before_after import before_after_common
 from ir_recorder import Analysis, findings
 from ir_recorder.analysis.production import PREDICTED
 from ir_recorder.report import report_html
-from ir_recorder.report.compare import comparison_html
-from ir_recorder.report.costs import ROUNDED, Costs
-from ir_recorder.report.fleet import Member, fleet_html, member_of
+from ir_recorder.report.before_after import before_after_html
+from ir_recorder.report.fleet import fleet_html
+from ir_recorder.report.fleet_members import Member, member_of
 from ir_recorder.report.money_text import money, yearly_money
 from ir_recorder.report.number_text import (
     joules,
@@ -33,8 +33,9 @@ from ir_recorder.report.number_text import (
     watts,
     yearly_kilowatt_hours,
 )
-from ir_recorder.report.program_comparison import before_after_html
+from ir_recorder.report.prices import ROUNDED, Costs
 from ir_recorder.report.robots import robots_html
+from ir_recorder.report.side_by_side import comparison_html
 
 NUMBER = re.compile(r"-?\d[\d\s\u00a0\u202f]*(?:\.\d+)?")
 SCALES = {"kWh": 3.6e6, "Wh": 3600.0, "kJ": 1000.0, "J": 1.0, "W": 1.0, "kg": 1.0, "EUR": 1.0}

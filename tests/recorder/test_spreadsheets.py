@@ -17,8 +17,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ir_recorder import Analysis, RecorderError
-from ir_recorder.report.costs import Costs
-from ir_recorder.report.fleet import fleet_html, member_of
+from ir_recorder.report.fleet import fleet_html
+from ir_recorder.report.fleet_members import member_of
+from ir_recorder.report.prices import Costs
 from ir_recorder.report.step_table import step_columns, workbook, write_columns, write_table
 
 SHEET = "{http://schemas.openxmlformats.org/spreadsheetml/2006/main}"

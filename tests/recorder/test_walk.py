@@ -33,9 +33,9 @@ from ir_recorder.analysis.production import (
 )
 from ir_recorder.analysis.tending import Span
 from ir_recorder.report import report_html, robots
-from ir_recorder.report.compare import comparison_html
-from ir_recorder.report.costs import Costs
-from ir_recorder.report.fleet import fleet_columns, fleet_html, member_of
+from ir_recorder.report.fleet import fleet_html
+from ir_recorder.report.fleet_members import fleet_columns, member_of
+from ir_recorder.report.prices import Costs
 from ir_recorder.report.robots import (
     common_cycle,
     common_demand,
@@ -44,6 +44,7 @@ from ir_recorder.report.robots import (
     predicted_joules,
     robots_html,
 )
+from ir_recorder.report.side_by_side import comparison_html
 from ir_recorder.report.step_table import write_table
 from ir_recorder.report.tables import savings_lines
 

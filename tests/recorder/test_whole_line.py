@@ -13,8 +13,10 @@ from ir_msgs_py.savings import Saving
 from ir_recorder import Analysis, findings
 from ir_recorder.analysis.production import Amount, production_of
 from ir_recorder.report import report_html, whole_line
-from ir_recorder.report.costs import Costs
-from ir_recorder.report.fleet import fleet_html, fleet_of_line, member_of
+from ir_recorder.report.fleet import fleet_html
+from ir_recorder.report.fleet_figures import fleet_of_line
+from ir_recorder.report.fleet_members import member_of
+from ir_recorder.report.prices import Costs
 from ir_recorder.report.whole_line import line_section, of_recording, of_saving, of_whole_line
 
 

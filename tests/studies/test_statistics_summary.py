@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ir_recorder.report.costs import Costs
 from ir_recorder.report.money_text import money
 from ir_recorder.report.number_text import DASH, kilowatt_hours
+from ir_recorder.report.prices import Costs
 from ir_studies.statistics.findings import NO_PAIR, NOT_DRIVEN, failures_of, findings_of
 from ir_studies.statistics.outputs import (
     FEW,

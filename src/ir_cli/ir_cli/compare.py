@@ -112,8 +112,8 @@ def add_compare(compare: argparse.ArgumentParser) -> None:
 
 def run_compare(arguments: argparse.Namespace) -> int:
     """Compare, write the page, print the figures."""
-    from ir_recorder.report.costs import Costs, read_costs
-    from ir_recorder.report.program_comparison import write_before_after, write_before_after_table
+    from ir_recorder.report.before_after import write_before_after, write_before_after_table
+    from ir_recorder.report.prices import Costs, read_costs
     from ir_recorder.report.whole_line import of_saving
 
     files = [Path(arguments.cell), *arguments.today]

@@ -6,9 +6,10 @@ import argparse
 import sys
 
 from ir_recorder.arguments import add_roots, roots_of
-from ir_recorder.report.costs import Costs, read_costs
-from ir_recorder.report.fleet import read_members, write_fleet, write_fleet_table
+from ir_recorder.report.fleet import write_fleet
+from ir_recorder.report.fleet_members import read_members, write_fleet_table
 from ir_recorder.report.number_text import add_locale
+from ir_recorder.report.prices import Costs, read_costs
 from ir_recorder.report_main import add_arguments, run
 
 _CLEAR = "\r\x1b[2K"

@@ -21,10 +21,10 @@ from ir_recorder.reading.planner_answers import recorded_front
 from ir_recorder.reading.reader import read_recording
 from ir_recorder.reading.recording import Recording
 from ir_recorder.report import write_report
-from ir_recorder.report.compare import MOST, write_comparison
-from ir_recorder.report.costs import read_costs
 from ir_recorder.report.number_text import add_locale
 from ir_recorder.report.picture import write_picture
+from ir_recorder.report.prices import read_costs
+from ir_recorder.report.side_by_side import MOST, write_comparison
 from ir_recorder.report.step_table import write_table
 from ir_recorder.traces import read_mapping
 from ir_values.errors import IrError

@@ -49,9 +49,9 @@ from ir_recorder.analysis.checks import row_name
 from ir_recorder.analysis.production import production_of
 from ir_recorder.format import contents
 from ir_recorder.report import write_report
-from ir_recorder.report.costs import computed_words
 from ir_recorder.report.number_text import interval, number
 from ir_recorder.report.picture import write_picture
+from ir_recorder.report.program_names import computed_words
 from ir_recorder.report.tables import savings_lines
 from ir_values.errors import IrError, RequestRefusedError
 from ir_values.output_files import write_file

@@ -18,14 +18,14 @@ from ir_msgs_py.report import PlannedMovement, TrajectoryReport
 from ir_planner import CancelledError, Goal, Planner, PlannerError
 from ir_planner.before_after import before_after_common
 from ir_recorder.analysis.production import planned_share
-from ir_recorder.report.costs import Costs
-from ir_recorder.report.number_text import kilowatt_hours, seconds
-from ir_recorder.report.program_comparison import (
+from ir_recorder.report.before_after import (
     assumptions,
     basis_section,
     change_table,
     figure_table,
 )
+from ir_recorder.report.number_text import kilowatt_hours, seconds
+from ir_recorder.report.prices import Costs
 from ir_values.errors import IrError
 
 # The latest action of each kind counts: a quick hand drags a machine through a hundred places a

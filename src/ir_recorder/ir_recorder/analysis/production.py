@@ -49,6 +49,8 @@ WAITING = "waiting between steps"
 SLOWER = "slower, in the common program's time"
 FULL_PAUSES = "pauses at full length"
 HIBERNATION = "HIBERNATION"
+LEFT_ALONE = "STAND_ON_BRAKES"
+"""The mode that a controller goes into by itself while nobody works."""
 OPEN = "zero lies in it: it is open whether anything is saved"
 DRIVES_ONLY = "drives only, controller not counted"
 

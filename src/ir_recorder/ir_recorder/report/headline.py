@@ -25,23 +25,10 @@ from ir_recorder.analysis.production import (
 from ir_recorder.format.contents import OWN_FACTS, VERSION
 from ir_recorder.reading.recording import Recording
 from ir_recorder.report.answer import Answer
-from ir_recorder.report.costs import (
-    COMMON,
-    DRIVEN,
-    PLANNED,
-    Costs,
-    IdleSaving,
-    computed_words,
-    cycles_of_year,
-    demand_note,
-    driven_detail,
-    money_of_thousand,
-    origin_of,
-    recorded_demand,
-    recorded_idle_saving,
-)
+from ir_recorder.report.cycle_costs import cycles_of_year, money_of_thousand
 from ir_recorder.report.methods import counted
 from ir_recorder.report.money_text import yearly_money
+from ir_recorder.report.nights import IdleSaving, recorded_idle_saving
 from ir_recorder.report.number_text import (
     interval,
     kilograms,
@@ -69,6 +56,16 @@ from ir_recorder.report.paid import (
     first_steps,
     reached_saving,
 )
+from ir_recorder.report.prices import Costs
+from ir_recorder.report.program_names import (
+    COMMON,
+    DRIVEN,
+    PLANNED,
+    computed_words,
+    driven_detail,
+    origin_of,
+)
+from ir_recorder.report.quarter_hour import demand_note, recorded_demand
 
 _STYLES = {Verdict.HOLDS: "good", Verdict.FAILS: "bad", Verdict.NOT_CHECKED: "open"}
 

@@ -15,15 +15,7 @@ from ir_recorder.analysis.indirect import agreement
 from ir_recorder.analysis.production import production_of
 from ir_recorder.report.bars import joule_bars
 from ir_recorder.report.charts import front_section
-from ir_recorder.report.costs import (
-    Costs,
-    assumed_section,
-    clock_section,
-    costs_section,
-    following_price,
-    lever_section,
-    own_pace,
-)
+from ir_recorder.report.cycle_costs import costs_section, lever_section
 from ir_recorder.report.data import page_data
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import (
@@ -39,7 +31,10 @@ from ir_recorder.report.headline import (
 )
 from ir_recorder.report.methods import methods_section
 from ir_recorder.report.money_text import with_elements
+from ir_recorder.report.nights import clock_section
 from ir_recorder.report.number_text import joules, text
+from ir_recorder.report.prices import Costs, assumed_section, following_price
+from ir_recorder.report.program_names import own_pace
 from ir_recorder.report.sankey import sankey_section
 from ir_recorder.report.tables import (
     check_table,

@@ -11,17 +11,7 @@ from enum import StrEnum
 from ir_recorder.analysis.production import Amount
 from ir_recorder.report.answer import Answer
 from ir_recorder.report.bars import Piece, Row, bars
-from ir_recorder.report.costs import (
-    COMMON,
-    ON_BRAKES,
-    PLANNED,
-    TODAY,
-    Costs,
-    IdleSaving,
-    SavedYear,
-    payback,
-    saved_year,
-)
+from ir_recorder.report.cycle_costs import payback
 from ir_recorder.report.money_text import (
     NOTHING,
     money,
@@ -29,7 +19,10 @@ from ir_recorder.report.money_text import (
     yearly_money,
     yearly_span,
 )
+from ir_recorder.report.nights import IdleSaving, SavedYear, saved_year
 from ir_recorder.report.number_text import text, watts
+from ir_recorder.report.prices import Costs
+from ir_recorder.report.program_names import COMMON, ON_BRAKES, PLANNED, TODAY
 
 
 @dataclass(frozen=True)

@@ -25,20 +25,7 @@ from ir_recorder.analysis.results import StepResult
 from ir_recorder.analysis.robots import STAMPS, zone_passes
 from ir_recorder.analysis.tending import Span
 from ir_recorder.report.answer import Answer
-from ir_recorder.report.costs import (
-    DRIVEN,
-    Costs,
-    IdleSaving,
-    assumed_section,
-    counted_with,
-    cycles_of_year,
-    demand_note,
-    demand_of,
-    following_price,
-    idle_saving,
-    money_of_thousand,
-    payback,
-)
+from ir_recorder.report.cycle_costs import cycles_of_year, money_of_thousand, payback
 from ir_recorder.report.files import write_output
 from ir_recorder.report.gantt import Bar, Gantt, legend, mode_bars, together
 from ir_recorder.report.headline import (
@@ -50,6 +37,7 @@ from ir_recorder.report.headline import (
     yearly_tile,
 )
 from ir_recorder.report.methods import counted
+from ir_recorder.report.nights import IdleSaving, idle_saving
 from ir_recorder.report.number_text import (
     DASH,
     kilograms,
@@ -63,6 +51,9 @@ from ir_recorder.report.number_text import (
 )
 from ir_recorder.report.page import PAGE_START
 from ir_recorder.report.paid import Paid, RunNow, Tile, a_night, counted_at, first_steps, row_of
+from ir_recorder.report.prices import Costs, assumed_section, counted_with, following_price
+from ir_recorder.report.program_names import DRIVEN
+from ir_recorder.report.quarter_hour import demand_note, demand_of
 from ir_recorder.report.shell import shell
 from ir_recorder.report.tables import check_table, table
 from ir_values.files import ANYWHERE, FileRoots

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from ir_msgs_py.savings import Saving
 from ir_recorder.analysis import Analysis
 from ir_recorder.analysis.production import Amount, production_of, saved_amount
-from ir_recorder.report.costs import Costs
 from ir_recorder.report.number_text import text
+from ir_recorder.report.prices import Costs
 from ir_recorder.report.tables import COMPACT, table
 
 _NAMES = {

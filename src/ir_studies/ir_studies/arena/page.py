@@ -107,7 +107,7 @@ def _view() -> tuple[FloatArray, FloatArray, FloatArray]:
     return right, np.cross(near, right), near
 
 
-SCRIPTS = ("charts.js", "axes.js", "export.js", "compare.js")
+SCRIPTS = ("charts.js", "axes.js", "export.js", "side_by_side.js")
 _AGAINST = ">cost against"
 _HEADS = (
     "planner", ">solved", ">first answer", ">best answer", _AGAINST,

@@ -19,13 +19,7 @@ from ir_planner.checks import JouleInterval
 from ir_recorder.analysis.production import Amount
 from ir_recorder.report.answer import Answer
 from ir_recorder.report.bars import Piece, Row, bars, tick_step
-from ir_recorder.report.costs import (
-    Costs,
-    assumed_section,
-    counted_with,
-    cycles_of_year,
-    payback,
-)
+from ir_recorder.report.cycle_costs import cycles_of_year, payback
 from ir_recorder.report.files import write_output
 from ir_recorder.report.money_text import yearly_money, yearly_span
 from ir_recorder.report.number_text import (
@@ -39,6 +33,7 @@ from ir_recorder.report.number_text import (
 )
 from ir_recorder.report.page import PAGE_START
 from ir_recorder.report.paid import OF_DATA, Tile, between_of, counted_at, row_of
+from ir_recorder.report.prices import Costs, assumed_section, counted_with
 from ir_recorder.report.shapes import body_mesh, capsule_mesh
 from ir_recorder.report.shell import source_badge
 from ir_recorder.report.step_table import write_columns

@@ -11,12 +11,12 @@ import numpy as np
 from ir_recorder.analysis.intervals import ALIKE, LEVEL, Mean
 from ir_recorder.report.answer import Answer
 from ir_recorder.report.bars import tick_step
-from ir_recorder.report.costs import Costs
 from ir_recorder.report.files import write_output
 from ir_recorder.report.methods import counted
 from ir_recorder.report.money_text import money, price_of
 from ir_recorder.report.number_text import DASH, kilowatt_hours, significant, text
 from ir_recorder.report.page import PAGE_START, folded
+from ir_recorder.report.prices import Costs
 from ir_recorder.report.shell import SIMULATED, source_badge
 from ir_recorder.report.step_table import write_columns
 from ir_recorder.report.tables import table

@@ -21,12 +21,12 @@ from ir_msgs_py.savings import ProgramPoint
 from ir_recorder import Analysis, analyse, findings
 from ir_recorder.analysis.production import production_of
 from ir_recorder.report.charts import COLOURS, MARKS, Point, front_chart, front_section, pareto
-from ir_recorder.report.compare import _WITH_PAUSES, comparison_html
-from ir_recorder.report.costs import Costs
 from ir_recorder.report.headline import source
 from ir_recorder.report.money_text import yearly_money
 from ir_recorder.report.number_text import joules, kilowatt_hours, seconds
 from ir_recorder.report.page import asset
+from ir_recorder.report.prices import Costs
+from ir_recorder.report.side_by_side import _WITH_PAUSES, comparison_html
 from ir_recorder.report.step_table import step_columns, write_table
 from ir_recorder.report_main import main
 

@@ -29,18 +29,7 @@ from ir_recorder.analysis.steps import step_label
 from ir_recorder.report.answer import Answer
 from ir_recorder.report.bars import Piece, Row, bars
 from ir_recorder.report.charts import Point, front_part
-from ir_recorder.report.costs import (
-    Costs,
-    IdleSaving,
-    assumed_section,
-    counted_with,
-    following_price,
-    origin_of,
-    own_pace,
-    payback,
-    recorded_idle_saving,
-    saved_year,
-)
+from ir_recorder.report.cycle_costs import payback
 from ir_recorder.report.files import write_output
 from ir_recorder.report.headline import checked, plant_of
 from ir_recorder.report.money_text import (
@@ -49,6 +38,7 @@ from ir_recorder.report.money_text import (
     yearly_span,
 )
 from ir_recorder.report.motion_scene import planned_side, rests_of
+from ir_recorder.report.nights import IdleSaving, recorded_idle_saving, saved_year
 from ir_recorder.report.number_text import (
     DASH,
     joules,
@@ -62,6 +52,8 @@ from ir_recorder.report.number_text import (
 )
 from ir_recorder.report.page import PAGE_START, asset
 from ir_recorder.report.paid import a_night, counted_at, first_steps
+from ir_recorder.report.prices import Costs, assumed_section, counted_with, following_price
+from ir_recorder.report.program_names import origin_of, own_pace
 from ir_recorder.report.series import Curves, Json, packed, stretches
 from ir_recorder.report.shell import badge, shell
 from ir_recorder.report.tables import COMPACT, table
@@ -69,7 +61,7 @@ from ir_values.arrays import FloatArray
 from ir_values.files import ANYWHERE, FileRoots
 
 MOST = 12  # recordings on one page: more columns than that are not read
-SCRIPTS = ("charts.js", "axes.js", "export.js", "price.js", "compare.js")
+SCRIPTS = ("charts.js", "axes.js", "export.js", "price.js", "side_by_side.js")
 _POINTS = 4000  # of a power curve
 Compared = tuple[Analysis, Sequence[Finding]]
 
@@ -104,7 +96,7 @@ def comparison_html(compared: Sequence[Compared], costs: Costs | None = None) ->
         "steps_paper": " paper" if len(names) <= _BESIDE else "",
         "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
     }
-    main = re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("compare.html"))
+    main = re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("side_by_side.html"))
     origins = "; ".join(dict.fromkeys(plant_of(each) for each in analyses))
     kind, words = _verdict(compared)
     return shell(

@@ -23,26 +23,11 @@ from ir_recorder.analysis.production import (
 )
 from ir_recorder.report.cell_scene import cell_scene
 from ir_recorder.report.charts import Point, front_part
-from ir_recorder.report.costs import (
-    COMMON,
-    J_PER_KWH,
-    PLANNED,
-    Costs,
-    Demand,
-    IdleSaving,
-    assumed_section,
-    counted_with,
-    cycles_of_year,
-    demand_note,
-    demand_of,
-    following_price,
-    how_to_hibernate,
-    idle_saving,
-    share_between,
-)
+from ir_recorder.report.cycle_costs import cycles_of_year, share_between
 from ir_recorder.report.files import write_output
 from ir_recorder.report.money_text import yearly_money, yearly_span
 from ir_recorder.report.motion_scene import common_rests, in_step, motion_of, power_curves, rests_of
+from ir_recorder.report.nights import IdleSaving, how_to_hibernate, idle_saving
 from ir_recorder.report.number_text import (
     DASH,
     ENGLISH,
@@ -58,6 +43,15 @@ from ir_recorder.report.number_text import (
 )
 from ir_recorder.report.page import PAGE_START, asset, filled, folded
 from ir_recorder.report.paid import MOVEMENTS, PAUSES, Before, Paid, Tile, at_night, row_of
+from ir_recorder.report.prices import (
+    J_PER_KWH,
+    Costs,
+    assumed_section,
+    counted_with,
+    following_price,
+)
+from ir_recorder.report.program_names import COMMON, PLANNED
+from ir_recorder.report.quarter_hour import Demand, demand_note, demand_of
 from ir_recorder.report.series import long_rests
 from ir_recorder.report.shell import badge
 from ir_recorder.report.step_table import TableValue, write_columns
