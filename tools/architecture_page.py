@@ -53,10 +53,11 @@ def arrows(package: str) -> Arrows:
             for node in ast.walk(parsed(path)):
                 if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
                     names.add(node.module)
+                    names.update(f"{node.module}.{alias.name}" for alias in node.names)
                 elif isinstance(node, ast.Import):
                     names.update(alias.name for alias in node.names)
         inner = {name.split(".")[1] for name in names if name.startswith(f"{package}.")}
-        found[room] = inner - {room}
+        found[room] = inner & rooms(package).keys() - {room}
     return found
 
 

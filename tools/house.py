@@ -360,6 +360,7 @@ def main() -> None:
         ir = str(Path(python).with_name("ir"))
         for name, command in (
             ("import ir_planner", (python, "-c", "import ir_planner")),
+            ("from ir_planner import Planner", (python, "-c", "from ir_planner import Planner")),
             ("import scipy", (python, "-c", "import scipy")),
             ("import scipy.optimize", (python, "-c", "import scipy.optimize")),
             ("ir --help", (ir, "--help")),

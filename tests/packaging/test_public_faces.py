@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import ast
 import importlib
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -15,6 +17,14 @@ PACKAGES = sorted(
     setup.parent.name
     for setup in SRC.glob("*/setup.py")
     if "__all__" in (setup.parent / setup.parent.name / "__init__.py").read_text(encoding="utf-8")
+)
+
+
+MACHINERY = ("__future__", "typing", "ir_values.faces")
+LAZY = sorted(
+    ".".join(face.relative_to(SRC).parent.parts[1:])
+    for face in SRC.glob("*/ir_*/**/__init__.py")
+    if "= on_first_use(" in face.read_text(encoding="utf-8")
 )
 
 
@@ -28,10 +38,10 @@ def imported(package: str) -> set[str]:
     tree = ast.parse((SRC / package / package / "__init__.py").read_text(encoding="utf-8"))
     return {
         alias.asname or alias.name
-        for node in tree.body
+        for node in ast.walk(tree)
         if isinstance(node, ast.ImportFrom)
         for alias in node.names
-        if not (alias.asname or alias.name).startswith("_") and node.module != "__future__"
+        if not (alias.asname or alias.name).startswith("_") and node.module not in MACHINERY
     }
 
 
@@ -53,3 +63,34 @@ def test_the_face_says_what_it_is(package: str) -> None:
     face = importlib.import_module(package)
     assert face.__doc__
     assert face.__doc__.strip()
+
+
+@pytest.mark.parametrize("package", LAZY)
+def test_a_face_imports_on_first_use_what_it_tells_type_checkers(package: str) -> None:
+    face = importlib.import_module(package)
+    assert face.__file__ is not None
+    nodes = list(ast.walk(ast.parse(Path(face.__file__).read_text(encoding="utf-8"))))
+    told = {
+        node.module: tuple(alias.name for alias in node.names)
+        for node in nodes
+        if isinstance(node, ast.ImportFrom) and node.module not in MACHINERY
+    }
+    calls = [node for node in nodes if isinstance(node, ast.Call)]
+    assert [ast.literal_eval(call.args[1]) for call in calls if len(call.args) == 2] == [told]
+    assert set(face.__all__) <= set(dir(face))
+    for home, names in told.items():
+        for name in names:
+            assert getattr(face, name) is getattr(importlib.import_module(str(home)), name)
+    with pytest.raises(AttributeError, match=f"module '{package}' has no attribute 'nothing'"):
+        face.nothing  # noqa: B018
+
+
+def test_the_planner_is_imported_when_it_is_named_and_the_flexible_cell_when_it_plans_one() -> None:
+    script = (
+        "import sys, ir_planner\n"
+        "assert not {'numpy', 'ir_planner.planner'} & sys.modules.keys()\n"
+        "planner = ir_planner.Planner('demo')\n"
+        "assert not {'highspy', 'ir_planner.flexible.steady_plan'} & sys.modules.keys()\n"
+        "assert ir_planner.SteadyPlan.__module__ in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True)

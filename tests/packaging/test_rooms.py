@@ -20,7 +20,7 @@ ROOMS = {
         "errors", "presentation", "cycle", "curves", "scene", "request", "checks", "configurations", "timing", "search", "optimize",  # noqa: E501
         "cartesian", "regional", "trajectories", "service", "settings", "program", "store",
         "current_cell", "validity", "state_queries", "waiting_postures", "flexible", "planner",
-        "krl", "robots", "before_after", "what_if", "node", "contract",
+        "krl", "robots", "before_after", "what_if_table", "node", "contract",
     ),
     "ir_description": (
         "poses", "shapes", "robot", "cell", "files", "library",
@@ -41,6 +41,9 @@ def imported(package: str, module: Path) -> list[tuple[str, str, int]]:
     found = []
     for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
         names = [node.module] if isinstance(node, ast.ImportFrom) and node.level == 0 else []
+        if names == [package]:
+            inside = [alias.name for alias in node.names if alias.name in ROOMS[package]]
+            names = [f"{package}.{room}" for room in inside]
         names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
         for name in names:
             top, _, rest = (name or "").partition(".")

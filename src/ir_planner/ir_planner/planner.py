@@ -25,6 +25,7 @@ from ir_msgs_py.cartesian import CartesianPath
 from ir_msgs_py.options import DEFAULT_SAFETY_DISTANCE, NO_TILT, PlanOptions
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
+from ir_planner import flexible
 from ir_planner.cartesian import CartesianPlan, checked_path_options, plan_path
 from ir_planner.checks import Evaluation, StateCheck, evaluate_trajectory
 from ir_planner.configurations import (
@@ -35,7 +36,6 @@ from ir_planner.configurations import (
 )
 from ir_planner.current_cell import CurrentCell, DriverReports, ReadCell, read_cell_here
 from ir_planner.errors import RequestError, unfit, unknown_name
-from ir_planner.flexible import SteadyPlan, plan_steady_cycle
 from ir_planner.program import (
     AS_THE_CELL_SAYS,
     PauseLengths,
@@ -627,7 +627,7 @@ class Planner:
         cycles: int = 0,
         units: int = 1,
         **changes: Unpack[OptionFields],
-    ) -> SteadyPlan:
+    ) -> "flexible.SteadyPlan":
         """The cheapest cycle of the cell's route that makes at least so many parts an hour, 0: as
         many as possible. saving: hold it against the common cycle; front_points: so many cycles
         from the fastest to the cheapest; cycles: also the run that fills the line from empty and
@@ -636,7 +636,7 @@ class Planner:
         """
         options, note = self._checked(options_with(options, changes))
         request, work = self._cycle_request(options, cancelled)
-        plan = plan_steady_cycle(
+        plan = flexible.plan_steady_cycle(
             request,
             parts_per_hour,
             work,

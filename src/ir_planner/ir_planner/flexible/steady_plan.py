@@ -162,7 +162,7 @@ class CycleStep:
     power_mode: str = ""
 
 
-def cycle_steps(plan: SteadyPlan) -> tuple[CycleStep, ...]:
+def timed_steps(plan: SteadyPlan) -> tuple[CycleStep, ...]:
     """The steps of one cycle in order."""
     assert plan.cycle is not None
     steps: list[CycleStep] = []
@@ -186,7 +186,7 @@ def robot_bars(plan: SteadyPlan) -> tuple[tuple[str, float, float, str], ...]:
     """What the robot does: name, begin, length [s], and kind: transport, hop or a power mode."""
     machine = dict(zip(plan.stations, plan.machines, strict=True))
     bars = []
-    for step in cycle_steps(plan):
+    for step in timed_steps(plan):
         there = f"to {machine[step.to_station]}"
         if step.kind == TRANSPORT:
             there = f"{machine[step.from_station]} {there}"

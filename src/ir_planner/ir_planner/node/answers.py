@@ -35,7 +35,7 @@ from ir_msgs_py.status import Status
 from ir_planner.cartesian import CartesianPlan
 from ir_planner.checks import Evaluation, StateCheck
 from ir_planner.configurations import IkAnswer
-from ir_planner.flexible import SteadyPlan, cycle_steps
+from ir_planner.flexible import SteadyPlan, timed_steps
 from ir_planner.krl import KrlExport
 from ir_planner.program import ProgramPlan, Standby
 from ir_planner.regional import EscapePlan, MovementPlan
@@ -179,7 +179,7 @@ def fill_steady_cycle(response: Any, plan: SteadyPlan, include_points: bool) -> 
             duration=step.seconds,
             power_mode=step.power_mode,
         )
-        for step in cycle_steps(plan)
+        for step in timed_steps(plan)
     ]
     response.period = plan.cycle.period
     response.units = plan.cycle.units
