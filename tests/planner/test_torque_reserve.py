@@ -102,3 +102,23 @@ def test_the_rated_payload_is_moved_whatever_the_reserve(seed: int) -> None:
         eased = [stage.note for stage in plan.info.stages if stage.name == "torque reserve"]
         assert bool(eased) == (plan.report.torque_reserve < 0.1 - 1e-6)
         assert 1.0 - plan.report.torque_ratio.max() >= plan.report.torque_reserve - 1e-6
+
+
+def test_around_an_obstacle_too_a_load_gets_as_much_of_the_reserve_as_it_needs() -> None:
+    """Whether a load is too heavy doesn't depend on what lies on the straight movement."""
+    cell = load_cell("table_columns")
+    mass = cell.robot.rated_payload
+    tool = replace(cell.tool, mass=mass, inertia=0.1 * mass * np.eye(3))
+    settings = PlannerSettings(torque_reserve=0.5)
+    planner = Planner(replace(cell, tool=tool), clock=lambda: 0.0, settings=settings)
+    task = planner.set_cell(planner.cell).task("tL->tR")
+    goal = Goal(configuration=task.goal, text="tR")
+    plan = planner.plan_regional(
+        start=task.start, goal=goal, options=PlanOptions(max_iterations=20_000)
+    )
+    assert plan.status.ok, plan.status.message
+    assert plan.report.certified
+    assert plan.waypoints is not None
+    assert len(plan.waypoints) > 2  # the straight one is not free
+    assert plan.report.torque_reserve < 0.5
+    assert any(stage.name == "torque reserve" for stage in plan.info.stages)

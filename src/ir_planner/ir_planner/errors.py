@@ -47,11 +47,15 @@ def unknown_name(what: str, name: str, known: Iterable[str]) -> RequestError:
 
 
 class TimingError(PlannerError):
-    """A path that can't be driven however slowly; `joint` is the one that can't carry on."""
+    """A path that can't be driven however slowly; `joint` is the one that can't carry on.
 
-    def __init__(self, sentence: str, joint: int) -> None:
+    too_heavy: as the torque that may be used doesn't even move the load slowly.
+    """
+
+    def __init__(self, sentence: str, joint: int, *, too_heavy: bool = False) -> None:
         super().__init__(sentence)
         self.joint = joint
+        self.too_heavy = too_heavy
 
 
 class CancelledError(PlannerError):

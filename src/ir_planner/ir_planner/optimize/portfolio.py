@@ -262,6 +262,7 @@ class Portfolio:
                 movement = straight_steps(path, self.context)
             except TimingError as error:
                 self.journal.reject(f"torque: {error}")
+                self.journal.too_heavy += error.too_heavy
                 continue
             violation = movement.prove().violation
             if violation is not None:

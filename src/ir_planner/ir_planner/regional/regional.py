@@ -54,7 +54,6 @@ from ir_planner.request import Context, Goal, Journal, within_limits
 from ir_planner.scene import STILL, path_cost
 from ir_planner.search import Ends, fewest_corners, keeps_upright, pulled
 from ir_planner.timing import (
-    TOO_HEAVY,
     Movement,
     check_requested,
     with_less_reserve,
@@ -110,16 +109,20 @@ def refusal(
             f"no path found{cut}: {sentence}; tried: {tried}; a larger tilt_max, or another start "
             "or goal configuration, may help",
         )
-    if certificate.verdict[0] == FREE:
+    if path:
         rejected = (f"{reason} ({count})" for reason, count in journal.rejected.items())
         reasons = (
             "; ".join(rejected) or "max_iterations or planning_time ended before one was timed"
         )
+        which = "the straight path" if certificate.verdict[0] == FREE else "a path"
         return Status(
             StatusCode.PLANNING_FAILED,
-            f"the straight path is free but no movement could be certified: {reasons}"
-            if path
-            else f"no path found{cut}, though the straight movement is free: tried: {tried}",
+            f"{which} is free but no movement could be certified: {reasons}",
+        )
+    if certificate.verdict[0] == FREE:
+        return Status(
+            StatusCode.PLANNING_FAILED,
+            f"no path found{cut}, though the straight movement is free: tried: {tried}",
         )
     share = float(certificate.t1[0])
     q = start + share * (goal - start)
@@ -176,14 +179,22 @@ def search_regional(
     _check_search(context, searches)
     if context.motion is not None:
         return search_in_motion(start, np.atleast_2d(goals), context, searches)
-    status, movement = _by_timing(start, goals, context, searches)
-    if movement is None and TOO_HEAVY in status.message:
-        lines = [(np.asarray(start), goal) for goal in np.atleast_2d(goals)]
+    ends = Ends(start, np.atleast_2d(goals))
+    paths = _paths_between(ends, context, searches)
+    if isinstance(paths, Status):
+        return paths, None
+    heavy_before = context.journal.too_heavy
+    movement = _by_timing(ends, list(paths), context, searches)
+    if movement is None and context.journal.too_heavy > heavy_before:
+        lines = [(np.asarray(start), goal) for goal in ends.goals]
         for eased in with_less_reserve(lines, context):
-            status, movement = _by_timing(start, goals, eased, searches)
+            movement = _by_timing(ends, list(paths), eased, searches)
             if movement is not None:
                 break
-    return status, movement
+    if movement is None:
+        space = _space_of(context)
+        return refusal(start, ends.goals[0], space, context.journal, path=True), None
+    return Status.success(), movement
 
 
 def _check_search(context: Context, searches: Searches) -> None:
@@ -199,40 +210,46 @@ def _check_search(context: Context, searches: Searches) -> None:
     )
 
 
+def _space_of(context: Context) -> FreeSpace:
+    return FreeSpace.of(context.scene, context.safety_distance, context.work, cone=context.cone)
+
+
+def _paths_between(ends: Ends, context: Context, searches: Searches) -> list[Path] | Status:
+    """Free paths from the start to goals; a status where an end is not free, or none was found."""
+    if context.options.timing == "asynchronous":
+        context = context.with_timing("synchronous")
+    space = _space_of(context)
+    blocked = end_in_collision(ends.start, ends.goals[0], space, context.safety_distance)
+    blocked = blocked or end_outside_cone(ends.start, ends.goals[0], context.cone)
+    return blocked or _free_paths(ends, space, context, searches)
+
+
 def _by_timing(
-    start: FloatArray, goals: FloatArray, context: Context, searches: Searches
-) -> tuple[Status, Movement | None]:
-    """The best movement found within the context's torque reserve: synchronous, or each joint with
-    a law of its own where that is asked for and serves better.
+    ends: Ends, paths: list[Path], context: Context, searches: Searches
+) -> Movement | None:
+    """The best movement that free paths lead to within the context's torque reserve: synchronous,
+    or each joint with a law of its own where that is asked for and serves better; None where none
+    is certified.
     """
     if context.options.timing != "asynchronous":
-        return _synchronous(start, goals, context, searches)
-    status, movement = _synchronous(start, goals, context.with_timing("synchronous"), searches)
-    return status, None if movement is None else with_own_laws(movement, context)
+        return _synchronous(ends, paths, context, searches)
+    movement = _synchronous(ends, paths, context.with_timing("synchronous"), searches)
+    return None if movement is None else with_own_laws(movement, context)
 
 
 def _synchronous(
-    start: FloatArray, goals: FloatArray, context: Context, searches: Searches
-) -> tuple[Status, Movement | None]:
-    """The best synchronous movement found."""
-    ends = Ends(start, np.atleast_2d(goals))
-    cone = context.cone
-    space = FreeSpace.of(context.scene, context.safety_distance, context.work, cone=cone)
-    blocked = end_in_collision(start, ends.goals[0], space, context.safety_distance)
-    blocked = blocked or end_outside_cone(start, ends.goals[0], cone)
-    if blocked is not None:
-        return blocked, None
-    paths = _free_paths(ends, space, context, searches)
-    if isinstance(paths, Status):
-        return paths, None
+    ends: Ends, paths: list[Path], context: Context, searches: Searches
+) -> Movement | None:
+    """The best synchronous movement that is certified."""
+    space = _space_of(context)
     best = _first_that_is_certified(Exploration(ends, paths, space, searches), context)
     if best is None:
-        return refusal(start, ends.goals[0], space, context.journal, path=True), None
+        return None
     context.journal.planner_id, movement = best
     context.journal.timing = "synchronous"
     if context.options.objective == "movement_cost":  # W of its waypoints is asked for
         movement = over_free_steps(movement, space)
-    return Status.success(), movement
+    return movement
 
 
 def _free_paths(

@@ -92,6 +92,7 @@ class Journal:
     timing: str = ""  # which the answer is
     stages: list[PlanningStage] = field(default_factory=list)
     rejected: Counter[str] = field(default_factory=Counter)
+    too_heavy: int = 0  # candidates dropped for a load that can't even be moved slowly
     logs: list[SearchLog] = field(default_factory=list)
 
     def __post_init__(self) -> None:

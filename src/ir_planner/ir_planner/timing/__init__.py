@@ -17,7 +17,7 @@ from ir_planner.timing.objective import (
     request_cost,
     slowed_for_tool,
 )
-from ir_planner.timing.ptp import TOO_HEAVY, fastest, free_law
+from ir_planner.timing.ptp import fastest, free_law
 from ir_planner.timing.reserve import need_of, with_less_reserve
 from ir_planner.timing.spline_timing import time_spline
 from ir_planner.timing.straight_steps import distinct, straight_steps
@@ -26,7 +26,6 @@ __all__ = [
     "DURATION_SLACK",
     "GRID_NS",
     "GRID_S",
-    "TOO_HEAVY",
     "TORQUE_SHARES",
     "Movement",
     "ObjectiveWeights",

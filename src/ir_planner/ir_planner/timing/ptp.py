@@ -30,7 +30,6 @@ from ir_values.arrays import BoolArray, FloatArray, IntArray
 _SPEEDS = np.array([1.0, 0.93, 0.86, 0.78, 0.7, 0.6, 0.5, 0.4, 0.28, 0.15])
 _REFINED = np.array([-0.045, -0.03, -0.015, 0.0, 0.015, 0.03, 0.045])
 _HALVINGS = 7
-TOO_HEAVY = "the load is too heavy for this movement"
 _PER_PHASE = 7
 
 
@@ -109,8 +108,10 @@ def fastest_law(
         kept = f", {limits.torque_reserve:g} is its reserve" if limits.torque_reserve > 0.0 else ""
         raise TimingError(
             f"joint {joint + 1} needs {need[joint]:.3f} of its torque at 1/256 of full speed, at "
-            f"most {limits.torque_share:.3f} may be used{kept}: {TOO_HEAVY}",
+            f"most {limits.torque_share:.3f} may be used{kept}: "
+            "the load is too heavy for this movement",
             joint,
+            too_heavy=True,
         )
     return _refined(best, start, delta, (a, j), limits.torque_share, dynamics)
 
