@@ -119,12 +119,14 @@ _PATIENCE = 3  # sweeps without that gain
 class Descent:
     """q (K, n) of the accepted starts (eq. 6), the rejected by reason, and the sweeps done.
 
+    reached: how many starts arrived at the pose, free there or not.
     tracks: the configurations (M, n) of each start from sweep to sweep. outcome: of each start, why
     it was rejected, "": accepted.
     """
 
     q: FloatArray
     sweeps: int
+    reached: int = 0
     rejected: Counter[str] = field(default_factory=Counter)
     tracks: list[FloatArray] = field(default_factory=list)
     outcome: list[str] = field(default_factory=list)
@@ -163,6 +165,7 @@ class _Descent:
         self.axis = robot.joint_axis
         self.rejected: Counter[str] = Counter()
         self.outcome: list[str] = []
+        self.reached = 0
 
     def run(self, starts: FloatArray, work: Work) -> Descent:
         """Sweep from all starts (N, n) at once until each has arrived, is given up, or work and
@@ -213,6 +216,7 @@ class _Descent:
         return Descent(
             np.concatenate(found),
             sweeps,
+            self.reached,
             self.rejected,
             [np.array(track) for track in tracks],
             self.outcome,
@@ -299,6 +303,7 @@ class _Descent:
         end = ccd(self.scene.chain, self.pose, q, self.low, self.high, settings)
         arrived = np.asarray(end.psi < self.settings.xi)
         reached = end.q[arrived]
+        self.reached += len(reached)
         if len(reached) == 0:
             return arrived, reached
         for k, at_pose in zip(start[arrived].tolist(), reached, strict=True):

@@ -78,11 +78,10 @@ def searched_configurations(
     margin = scene.collision.min_distance(q, limit).distance if len(q) else np.zeros(0)
     order = np.lexsort((-margin, np.round(movement_cost(scene.weights, near, q), 6)))
     q = np.ascontiguousarray(q[order])
-    collided = sum(n for reason, n in found.rejected.items() if reason.startswith("at the pose"))
     return Configurations(
         q,
         branches(q, scene),
-        len(found.q) + collided,
+        found.reached,
         found.rejected,
         tracks=tuple(found.tracks),
         outcome=tuple(found.outcome),

@@ -180,7 +180,8 @@ class ExitsFound:
     """Free paths (M_k, n) from the interaction configuration to outside the zone; `note`: what was
     done.
 
-    farthest (n,): the configuration farthest out; rejected: dropped candidates by reason. walk:
+    farthest (n,): the configuration farthest out; rejected: dropped candidates by reason, and
+    obstructed: those of them for which two bodies came too near, which a refusal names. walk:
     every step of a search that goes on from configurations it has reached.
     """
 
@@ -189,6 +190,7 @@ class ExitsFound:
     note: str = ""
     rejected: Counter[str] = field(default_factory=Counter)
     walk: WalkRecord | None = None
+    obstructed: Counter[str] = field(default_factory=Counter)
 
 
 class ExitSearch(Protocol):

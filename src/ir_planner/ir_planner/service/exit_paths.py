@@ -134,8 +134,8 @@ class ExitPath:
 
 @dataclass(frozen=True, eq=False)
 class Withdrawal:
-    """What was found; for a failure the configuration farthest out, and the rejected candidates by
-    reason.
+    """What was found; for a failure the configuration farthest out, and how many candidates each
+    pair of bodies obstructed.
 
     zone_distance [m] of `farthest`: negative inside.
     """
@@ -143,7 +143,7 @@ class Withdrawal:
     paths: list[ExitPath]
     farthest: FloatArray
     zone_distance: float
-    rejected: Counter[str]
+    obstructed: Counter[str]
 
 
 def exit_searches(modified_ga: ModifiedGa) -> Mapping[str, ExitSearch]:
@@ -160,7 +160,7 @@ def withdrawal(
     """
     seed = np.random.SeedSequence([journal.seed % 2**63, _STREAM])
     farthest = problem.interaction
-    rejected = Counter[str]()
+    obstructed = Counter[str]()
     depth = float(problem.area.zone_distance(farthest[None])[0])
     paths: list[ExitPath] = []
     default = [name for name in searches if not EXIT_SEARCHES.origin(name)]
@@ -171,7 +171,7 @@ def withdrawal(
             found = search.find(problem, _SEARCHED * wanted, seed, journal.work)
             notes.append(found.note)
         journal.rejected.update(+found.rejected)
-        rejected.update(found.rejected)
+        obstructed.update(found.obstructed)
         distance = float(problem.area.zone_distance(found.farthest[None])[0])
         if distance > depth:
             farthest = found.farthest
@@ -183,7 +183,7 @@ def withdrawal(
         with journal.stage("shorten") as notes:
             paths = _cheapest(paths, problem, wanted)
             notes.append(f"{len(paths)} different paths")
-    return Withdrawal(paths, farthest, depth, rejected)
+    return Withdrawal(paths, farthest, depth, obstructed)
 
 
 def _cheapest(paths: list[ExitPath], problem: Exit, wanted: int) -> list[ExitPath]:

@@ -175,6 +175,7 @@ def _search(
     if not status.ok:
         return status, ()
     failed = Status(StatusCode.PLANNING_FAILED, "nothing was tried")
+    untimed = Counter[str]()
     for q in interaction:
         upright = context.upright_from(q)
         leaning = _leaning(q, request, upright)
@@ -184,7 +185,7 @@ def _search(
         problem = Exit.of(q, upright)
         found = withdrawal(problem, request.max_candidates, method, searches, journal)
         with journal.stage("timing") as notes:
-            timed = [_timed(path, request, upright) for path in found.paths]
+            timed = [_timed(path, request, upright, untimed) for path in found.paths]
             certified = [movement for movement in timed if movement is not None]
             notes.append(f"{len(certified)} of {len(timed)} certified")
         if certified:
@@ -194,7 +195,7 @@ def _search(
             return Status.success(), tuple(
                 _candidate(path, movement, context) for path, movement in ranked
             )
-        failed = blocked(found, problem, journal)
+        failed = blocked(found, problem, journal, untimed)
         if journal.work.exhausted:
             break
     return failed, ()
@@ -215,20 +216,22 @@ def _leaning(q: FloatArray, request: ServiceRequest, context: Context) -> Status
 
 
 def _timed(
-    path: ExitPath, request: ServiceRequest, context: Context
+    path: ExitPath, request: ServiceRequest, context: Context, untimed: Counter[str]
 ) -> tuple[ExitPath, Movement] | None:
-    """The certified movement over an exit path, or None with its reason counted."""
+    """The certified movement over an exit path; None with its reason counted, in `untimed` too."""
     points = path.points[::-1] if request.direction == ENTRY else path.points
     try:
         movement = movement_over(points, context)
     except TimingError as error:
-        context.journal.reject(f"torque: {error}")
-        return None
-    violation = movement.prove().violation
-    if violation is not None:
-        context.journal.reject(f"not proved: {violation.what}")
-        return None
-    return path, movement
+        reason = f"torque: {error}"
+    else:
+        violation = movement.prove().violation
+        if violation is None:
+            return path, movement
+        reason = f"not proved: {violation.what}"
+    context.journal.reject(reason)
+    untimed[reason] += 1
+    return None
 
 
 def _ranked(
@@ -257,9 +260,11 @@ def _candidate(path: ExitPath, movement: Movement, context: Context) -> ServiceC
     )
 
 
-def blocked(found: Withdrawal, problem: Exit, journal: Journal) -> Status:
+def blocked(
+    found: Withdrawal, problem: Exit, journal: Journal, untimed: Mapping[str, int]
+) -> Status:
     """The status where no path was found: how far out, with which clearance there, and what
-    obstructed.
+    obstructed; untimed: why paths that were found made no movement.
     """
     scene = problem.inside.scene
     station = problem.area.station
@@ -272,14 +277,12 @@ def blocked(found: Withdrawal, problem: Exit, journal: Journal) -> Status:
     depth = max(problem.safety_distance - found.zone_distance, 0.0)
     ceiling = journal.work.ended_by
     cut = f" within {ceiling}" if ceiling else ""
-    met = Counter({reason: n for reason, n in found.rejected.items() if "too near" in reason})
     obstructing = (
-        ", ".join(f"{reason} ({count})" for reason, count in met.most_common(4)) or "nothing met"
+        ", ".join(f"{reason} ({count})" for reason, count in found.obstructed.most_common(4))
+        or "nothing met"
     )
     tried = ", ".join(f"{stage.name} ({stage.note})" for stage in journal.stages if stage.note)
-    reasons = "; ".join(
-        f"{r} ({n})" for r, n in journal.rejected.items() if r.startswith(("torque", "not proved"))
-    )
+    reasons = "; ".join(f"{reason} ({n})" for reason, n in untimed.items())
     sentence = (
         f"no path out of station {station.name} found{cut}: the configuration farthest out lacks "
         f"{depth * 1e3:.0f} mm to leave the zone of {station.equipment}{clearance}; obstructing: "

@@ -155,7 +155,7 @@ class ModifiedGa:
         note = (
             f"{len(walk.paths)} paths, {walk.generations} generations, {walk.candidates} candidates"
         )
-        return ExitsFound(walk.paths, walk.best, note, walk.rejected, walk.record)
+        return ExitsFound(walk.paths, walk.best, note, walk.rejected, walk.record, walk.obstructed)
 
 
 @dataclass(eq=False)
@@ -163,7 +163,8 @@ class Walk:
     """What a search found: paths (M_k, n) from the interaction configuration to outside, in the
     order they came.
 
-    best: the configuration farthest out; rejected: dropped candidates by reason.
+    best: the configuration farthest out; rejected: dropped candidates by reason, of which
+    obstructed: by pairs of bodies.
     """
 
     paths: list[FloatArray]
@@ -172,6 +173,7 @@ class Walk:
     candidates: int
     rejected: Counter[str] = field(default_factory=Counter)
     record: WalkRecord | None = None
+    obstructed: Counter[str] = field(default_factory=Counter)
 
 
 def withdraw(problem: Exit, settings: ModifiedGa, rng: np.random.Generator, wanted: int) -> Walk:
@@ -413,4 +415,6 @@ class _Walker:
     def _count_pairs(self, pairs: IntArray, what: str) -> None:
         for z, count in counted(pairs[pairs >= 0]):
             pair = self.scene.collision.pairs[z]
-            self.walk.rejected[f"{pair.body_a} {what} {pair.body_b}"] += count
+            named = f"{pair.body_a} {what} {pair.body_b}"
+            self.walk.rejected[named] += count
+            self.walk.obstructed[named] += count

@@ -8,6 +8,7 @@ stop. Then the whole movement is stretched to the duration that the objective li
 
 import itertools
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -112,7 +113,7 @@ _SHAPES: tuple[tuple[MakeLaw, float], ...] = (
     (fastest_law, 1.0),
     (fastest_law, 0.6),
 )
-NO_OWN_LAW = "neither torque nor clearance leaves a joint its own law: synchronous"
+_NO_OWN_LAW = "neither torque nor clearance leaves a joint its own law: synchronous"
 _CUTS = (1.0, 0.7, 0.5, 0.35, 0.2, 0.1, 0.0)  # shares of the largest overlap, down to a stop
 
 
@@ -129,11 +130,8 @@ def straight_steps(waypoints: FloatArray, context: Context) -> Movement:
         return Movement(waypoints, trajectory, context, "the goal is the start")
 
     def timed(limits: MotionLimits) -> Movement:
-        trajectory, note = _best_shape(waypoints, limits, context)
-        own = context.options.timing == "asynchronous" and note != NO_OWN_LAW
-        return Movement(
-            waypoints, trajectory, context, note, "asynchronous" if own else "synchronous"
-        )
+        found = _best_shape(waypoints, limits, context)
+        return Movement(waypoints, found.trajectory, context, found.note, found.timing)
 
     movement = within_torque(timed, context)
     assert movement is not None  # timed always makes one
@@ -152,25 +150,33 @@ def distinct(waypoints: FloatArray) -> FloatArray:
     return result
 
 
-def _best_shape(
-    waypoints: FloatArray, limits: MotionLimits, context: Context
-) -> tuple[JointTrajectory, str]:
-    """The trajectory in the shape and at the duration that the objective likes best, and a note."""
+class TimedSteps(NamedTuple):
+    """A trajectory over straight steps, its timing ("synchronous" where no joint has its own law),
+    and a note where that is not the one asked for.
+    """
+
+    trajectory: JointTrajectory
+    timing: str
+    note: str
+
+
+def _best_shape(waypoints: FloatArray, limits: MotionLimits, context: Context) -> TimedSteps:
+    """The trajectory in the shape and at the duration that the objective likes best."""
     options = context.options
-    best: tuple[float, JointTrajectory, str] | None = None
+    best: tuple[float, TimedSteps] | None = None
     for law, share in _SHAPES if _joules_count(options) else _SHAPES[:1]:
         context.work.check()
-        quickest, note = _fastest(waypoints, limits.scaled(1.0, share), law, context)
-        if best is not None and 0.0 < options.duration < quickest.duration:
+        quickest = _fastest(waypoints, limits.scaled(1.0, share), law, context)
+        if best is not None and 0.0 < options.duration < quickest.trajectory.duration:
             continue
-        trajectory = at_best_duration(quickest, context)
+        timed = quickest._replace(trajectory=at_best_duration(quickest.trajectory, context))
         if not _joules_count(options):
-            return trajectory, note
-        value = coarse_energy_cost(trajectory, context)
+            return timed
+        value = coarse_energy_cost(timed.trajectory, context)
         if best is None or value < best[0]:
-            best = (value, trajectory, note)
+            best = (value, timed)
     assert best is not None  # the first shape is taken or refused
-    return best[1], best[2]
+    return best[1]
 
 
 def _joules_count(options: PlanOptions) -> bool:
@@ -179,17 +185,15 @@ def _joules_count(options: PlanOptions) -> bool:
 
 def _fastest(
     waypoints: FloatArray, limits: MotionLimits, law: MakeLaw, context: Context
-) -> tuple[JointTrajectory, str]:
-    """The fastest trajectory in one shape, and a note where its timing is not the one that was
-    asked for.
-    """
+) -> TimedSteps:
+    """The fastest trajectory in one shape."""
     common = [law(a, b, limits, context.scene.dynamics) for a, b in itertools.pairwise(waypoints)]
     synchronous = context.options.timing == "synchronous"
     found = None if synchronous else _each_joint_alone(waypoints, common, limits, context)
     if found is not None:
-        return found
-    note = "" if synchronous else NO_OWN_LAW
-    return _cut_corners(waypoints, tuple(StepLaws((one,)) for one in common), limits, context), note
+        return TimedSteps(found[0], "asynchronous", found[1])
+    trajectory = _cut_corners(waypoints, tuple(StepLaws((one,)) for one in common), limits, context)
+    return TimedSteps(trajectory, "synchronous", "" if synchronous else _NO_OWN_LAW)
 
 
 def _each_joint_alone(
