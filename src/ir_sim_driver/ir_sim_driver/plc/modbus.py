@@ -52,7 +52,8 @@ class ExceptionCode(IntEnum):
 
 
 class Tables(Protocol):
-    """What requests read and write; each raises ModbusRefusedError, and has done nothing then.
+    """What requests read and write; each raises ModbusRefusedError, and has done nothing then,
+    except that a press of the emergency stop counts.
 
     came_ns: when the request that is being answered came at the earliest [ns of the monotonic
     clock], 0: now.
@@ -73,7 +74,7 @@ class Tables(Protocol):
         """All input registers."""
 
     def write_coils(self, start: int, levels: Sequence[bool]) -> None:
-        """Write all of these coils or none."""
+        """Write all of these coils or none; of refused ones a press of the emergency stop counts."""
 
     def write_registers(self, start: int, values: Sequence[int]) -> None:
         """Write all of these holding registers or none."""
@@ -235,7 +236,7 @@ T = TypeVar("T")
 
 
 class ControllerTables:
-    """Implements modbus_pdu.Tables on `controller`; watchdog [s]: longest time between
+    """Implements `Tables` on `controller`; watchdog [s]: longest time between
     heartbeats.
     """
 
