@@ -11,7 +11,9 @@ import pytest
 
 from ir_msgs_py.ros.testing import PATIENCE
 from ir_msgs_py.wake_on_lan import magic_packet, send_packet, wakes
+from ir_sim_driver.controller import Driver
 from ir_sim_driver.errors import DriverError
+from ir_sim_driver.node.node import open_links
 from ir_sim_driver.plc import WakeOnLan
 from ir_sim_driver.plc.modbus import ModbusTcp
 from ir_sim_driver.plc.port import Controller
@@ -84,3 +86,12 @@ def test_a_host_that_is_no_name_is_a_sentence_of_each_link(host):
             link()
     with pytest.raises(OSError, match=r"is no address|Errno"):
         send_packet(PACKET, host, 9)
+
+
+def test_without_wake_on_lan_no_port_is_open_and_nothing_hibernates():
+    """Closed by its setting; the driver says why it does not hibernate: nothing could wake it."""
+    said = []
+    driver = SimpleNamespace(plc=None, warn=said.append, forbid_hibernation=said.append)
+    link = WakeOnLan(wake_port=0, wake_on_lan=False)
+    assert open_links([link], cast(Driver, driver)) == {}
+    assert said == ["nothing could wake the controller (wake_on_lan: false)"]

@@ -219,7 +219,9 @@ def choose_ports(parameters: Given, claims: PortClaims) -> list[str]:
     driver = parameters["ir_sim_driver"]
     runner = parameters["ir_program_runner"]
     lines = []
-    wanted = [("wake_port", UDP, "Wake-on-LAN on UDP", [driver, runner])]
+    wanted = []
+    if driver.get("wake_on_lan", True):
+        wanted.append(("wake_port", UDP, "Wake-on-LAN on UDP", [driver, runner]))
     if driver.get("modbus"):
         wanted.append(("modbus_port", TCP, "Modbus on TCP", [driver]))
     for name, kind, what, takers in wanted:

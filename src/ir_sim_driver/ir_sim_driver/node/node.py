@@ -66,6 +66,8 @@ def open_links(links: Iterable[Link], driver: Driver) -> dict[str, OpenLink]:
     opened: dict[str, OpenLink] = {}
     for link in links:
         if not link.wanted:
+            if link.name == WakeOnLan.name:
+                driver.forbid_hibernation("nothing could wake the controller (wake_on_lan: false)")
             continue
         try:
             opened[link.name] = link.open(driver.plc)

@@ -74,7 +74,7 @@ class Tables(Protocol):
         """All input registers."""
 
     def write_coils(self, start: int, levels: Sequence[bool]) -> None:
-        """Write all of these coils or none; of refused ones a press of the emergency stop counts."""
+        """Write all of these coils or none; of refused ones an emergency stop counts."""
 
     def write_registers(self, start: int, values: Sequence[int]) -> None:
         """Write all of these holding registers or none."""

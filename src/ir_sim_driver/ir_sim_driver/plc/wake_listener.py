@@ -24,6 +24,11 @@ class WakeOnLan:
     name: ClassVar[str] = "wake_on_lan"
     sets_inputs: ClassVar[bool] = False
 
+    wake_on_lan: bool = setting(
+        True,
+        "Whether a Wake-on-LAN packet wakes the controller; it does not hibernate without.",
+        read_only=True,
+    )
     mac: str = setting(
         CONTROLLER_MAC, "MAC address that a Wake-on-LAN packet has to carry.", read_only=True
     )
@@ -44,8 +49,8 @@ class WakeOnLan:
 
     @property
     def wanted(self) -> bool:
-        """Always: nothing else ends hibernation."""
-        return True
+        """Whether the settings ask for it: nothing else ends hibernation."""
+        return self.wake_on_lan
 
     def open(self, controller: Controller) -> OpenLink:
         """Listen. Raises DriverError when the port is taken."""
