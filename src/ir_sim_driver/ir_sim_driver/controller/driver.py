@@ -230,7 +230,7 @@ class Driver:
             ended = self._goals.forget(ticket)
             if self._goals.runs(ticket):
                 self._simulation.notices.add(Level.WARN, sentence)
-                self._simulation.abort(f"{sentence}; stopped on the path")
+                self._simulation.abort(sentence)
         if ended is not None:
             ended(refused(f"{sentence}; it has not been started"))
 
@@ -238,7 +238,7 @@ class Driver:
         """Stop whatever runs along its path, with this warning."""
         with self._lock:
             self._simulation.notices.add(Level.WARN, sentence)
-            self._simulation.abort(f"{sentence}; stopped on the path")
+            self._simulation.abort(sentence)
 
     def following(self, ticket: int) -> Following | None:
         """How the robot follows this goal; None when it is not executed now."""

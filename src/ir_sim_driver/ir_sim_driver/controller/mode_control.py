@@ -204,7 +204,7 @@ class Pauses:
 # Decision: PLC bits, pauses and latches put together, and why no movement may start.
 
 MANUAL = (OperatingMode.T1, OperatingMode.T2)
-_STOPS = "was requested during the movement; stopped on the path"
+_STOPS = "was requested during the movement"
 
 
 class ModeControl:
@@ -240,7 +240,7 @@ class ModeControl:
         if self._plc.operating_mode is self._operating_mode:
             return ""
         self._operating_mode = self._plc.operating_mode
-        return f"the operating mode changed to {self._operating_mode.name}; stopped on the path"
+        return f"the operating mode changed to {self._operating_mode.name}"
 
     def interruption(self) -> str:
         """Why the power mode that is asked for stops a movement, "" when it goes on."""

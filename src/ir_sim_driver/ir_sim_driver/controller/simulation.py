@@ -305,7 +305,7 @@ class Simulation:
         """Stop this goal along its path; False when it does not run."""
         if self.executor.goal_id != goal_id:
             return False
-        self.executor.stop(ErrorCode.SUCCESSFUL, "canceled; stopped on the path", canceled=True)
+        self.executor.stop(ErrorCode.SUCCESSFUL, "canceled", canceled=True)
         return True
 
     def abort(self, sentence: str) -> None:
@@ -417,7 +417,7 @@ class Simulation:
                 self.abort(sentence)
         if self.watch.step(self.time):
             self.notices.add(Level.WARN, f"{self.watch.lost}; stopped on the path until it is back")
-            self.abort(f"{self.watch.lost}; stopped on the path")
+            self.abort(self.watch.lost)
 
     def heed_stop(self) -> None:
         """Act at once on an emergency stop that was pressed between two steps."""

@@ -27,8 +27,9 @@ from ir_sim_driver.motion.trajectory_checks import CurrentPath, LeadPath
 from ir_sim_driver.plant import Backend
 from ir_values.arrays import FloatArray
 
-ON_THE_PATH = "; stopped on the path"
-"""End of the sentences of goals that a stop along the path ends."""
+_STOPPED = "stopped on the path"
+_NOT_BEGUN = "it had not begun to move"
+"""How sentences end of goals that a stop along the path ends."""
 
 # Commands of the steps ahead: while path time passes evenly, many cost what one does.
 
@@ -146,6 +147,7 @@ class _Run:
     ahead: Iterator[tuple[float, FloatArray]] = field(default_factory=lambda: iter(()))
     settling: int = 0
     stopping: bool = False
+    reason: str = ""  # why it stops
     deviation: float = 0.0
 
 
@@ -292,15 +294,15 @@ class Executor:
         """
         moving = self.motion().qd.any()
         speed = self.path_speed
-        if self._run is not None:
-            outcome = self._run.outcome
-            if not self._run.stopping:
+        before = self._run
+        if before is not None:
+            outcome = before.outcome
+            if not before.stopping:
                 self._will_end(
                     ErrorCode.INVALID_GOAL, "preempted by another trajectory", canceled=False
                 )
             elif moving:
-                reason = outcome.sentence.removesuffix(ON_THE_PATH)
-                sentence = f"{reason}; another trajectory took over before the robot stood"
+                sentence = f"{before.reason}; another trajectory took over before the robot stood"
                 self._will_end(outcome.code, sentence, outcome.canceled)
             self._finish()
         s = self._settings
@@ -327,16 +329,17 @@ class Executor:
         self._speed.value = 1.0 if moving else 0.0
         self._fresh = not moving
 
-    def stop(self, code: ErrorCode, sentence: str, canceled: bool = False) -> None:
-        """Stop along the path; the goal ends so when the robot stands. A stop that has begun
-        stays.
+    def stop(self, code: ErrorCode, reason: str, canceled: bool = False) -> None:
+        """Stop along the path; the goal ends so when the robot stands, with the reason and that it
+        stopped there. A stop that has begun stays.
         """
         run = self._run
         if run is not None and not run.stopping:
-            if run.s == 0.0 and self._speed.value == 0.0:
-                sentence = f"{sentence.removesuffix(ON_THE_PATH)}; it had not begun to move"
+            has_begun = run.s != 0.0 or self._speed.value != 0.0
+            sentence = f"{reason}; {_STOPPED if has_begun else _NOT_BEGUN}"
             self._will_end(code, sentence, canceled)
             run.stopping = True
+            run.reason = reason
 
     def drop(self, sentence: str, code: ErrorCode = ErrorCode.INVALID_GOAL) -> None:
         """End the goal at once: nobody follows the command any more. One that was stopping has not
@@ -348,8 +351,7 @@ class Executor:
         if run.stopping and code is ErrorCode.INVALID_GOAL:
             before = run.outcome
             code = code if before.code is ErrorCode.SUCCESSFUL else before.code
-            reason = before.sentence.removesuffix(ON_THE_PATH)
-            sentence = f"{sentence}, before the robot stood: {reason}"
+            sentence = f"{sentence}, before the robot stood: {run.reason}"
         self._will_end(code, sentence, canceled=False)
         self._finish()
 
@@ -434,7 +436,7 @@ class Executor:
         sentence = run.path_tolerance.broken_position(self._names, error)
         if not sentence and run.path_tolerance.has_velocity:
             sentence = run.path_tolerance.broken_velocity(self._names, self.motion().qd - robot.qd)
-        return f"{sentence} at {self.path_time:.3f} s{ON_THE_PATH}" if sentence else ""
+        return f"{sentence} at {self.path_time:.3f} s" if sentence else ""
 
     def _settle(self, run: _Run, error: FloatArray, robot: Backend) -> None:
         sentence = run.goal_tolerance.broken_position(self._names, error)

@@ -123,7 +123,10 @@ def _position_excess(
         if at is not None:
             time, k, j = at
             unit = joint_unit(names[j])
-            sentence = _sentence(names[j], "is at", values[k, j], float(bounds[j]), time, unit)
+            value = float(values[k, j])
+            bound = float(bounds[j])
+            excess = abs(value - bound)
+            sentence = _sentence(f"{names[j]} is at", value, bound, excess, time, unit)
             candidates.append(_Excess(time, sentence))
     return min(candidates, default=None)
 
@@ -144,7 +147,7 @@ def _excess(
         return None
     time, k, j = at
     unit = joint_unit(names[j], unit)
-    return _Excess(time, _sentence(names[j], "needs", value[k, j], float(limit[j]), time, unit))
+    return _Excess(time, _needs(names[j], float(value[k, j]), float(limit[j]), time, unit))
 
 
 def _torque_excess(
@@ -167,7 +170,7 @@ def _torque_excess(
     needed = dynamics.inverse_dynamics(q[None], qd[None], qdd[None])[0, j]
     torque = float(np.copysign(bounds.upper[j] * limit, needed))
     time = start + float(bounds.time[j])
-    return _Excess(time, _sentence(names[j], "needs", torque, limit, time, "Nm"))
+    return _Excess(time, _needs(names[j], torque, limit, time, "Nm"))
 
 
 def _first(bad: BoolArray, when: FloatArray, starts: FloatArray) -> tuple[float, int, int] | None:
@@ -181,11 +184,15 @@ def _first(bad: BoolArray, when: FloatArray, starts: FloatArray) -> tuple[float,
     return float(starts[k] + when[k, j]), k, j
 
 
-def _sentence(name: str, verb: str, value: float, bound: float, time: float, unit: str) -> str:
-    excess = abs(value) - abs(bound) if verb == "needs" else abs(value - bound)
-    sized = bound if value >= 0.0 or verb == "is at" else -bound
+def _needs(name: str, value: float, limit: float, time: float, unit: str) -> str:
+    """What a joint needs of a quantity that is limited in both directions alike."""
+    bound = limit if value >= 0.0 else -limit
+    return _sentence(f"{name} needs", value, bound, abs(value) - limit, time, unit)
+
+
+def _sentence(what: str, value: float, bound: float, excess: float, time: float, unit: str) -> str:
     return (
-        f"{name} {verb} {value:.6g} {unit} at {time:.4f} s: the limit is {sized:.6g} {unit}, "
+        f"{what} {value:.6g} {unit} at {time:.4f} s: the limit is {bound:.6g} {unit}, "
         f"exceeded by {excess:.3g} {unit}"
     )
 

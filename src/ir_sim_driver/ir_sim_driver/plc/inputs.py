@@ -56,7 +56,6 @@ class Watchdog:
 
 OWNERS = ("any", *WRITERS)
 RESTART_BIT = "ks"
-_ONLY_ONE = "only one of AB, HIB and KS may be 1"
 _HANDOVER = 0.5  # s in which a program may set the bit of a deeper rest and clear the one before
 HIBERNATION_BIT = ROW[Mode.HIBERNATION].bit
 POWER_BITS = (*REST_OF_BIT, RESTART_BIT)
@@ -453,7 +452,7 @@ class Plc:
         if on:
             warning = f"PLC bit {names} ignored: {refusal}"
             if (
-                refusal == _ONLY_ONE
+                not self._gate(on, pause_active)
                 and self.rest is not None
                 and on == [ROW[self.rest].bit, HIBERNATION_BIT]
             ):
@@ -474,10 +473,15 @@ class Plc:
 
     def _refusal(self, on: list[str], pause_active: bool) -> str:
         """Why these power bits don't count, "" where they do."""
+        several = "only one of AB, HIB and KS may be 1" if len(on) > 1 else ""
+        return self._gate(on, pause_active) or several
+
+    def _gate(self, on: list[str], pause_active: bool) -> str:
+        """Why none of these power bits counts now, not even one alone; "" where one does."""
         if self.operating_mode is not OperatingMode.EXT:
             return f"operating mode is {self.operating_mode.name}, must be EXT"
         if pause_active and on:
             return "a PROFIenergy pause is on, end it first"
         if self.no_hibernation and HIBERNATION_BIT in on:
             return self.no_hibernation
-        return _ONLY_ONE if len(on) > 1 else ""
+        return ""
