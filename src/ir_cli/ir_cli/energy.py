@@ -328,7 +328,10 @@ def run_fit(arguments: argparse.Namespace) -> int:
     if arguments.picture:
         written.append(write_fit_picture(found, estimate.prior, arguments.picture))
     doubted = doubts(estimate, found)
-    begun = "the data sheet" if prior.name == DATA_SHEET else prior.name
+    row_name = begun = prior.name
+    if prior.name == DATA_SHEET:
+        row_name = "data sheet"
+        begun = "the data sheet"
     advised = recommendation(unseen, doubted=bool(doubted.sentences), begun=begun)
     said = (
         *data.notes,
@@ -345,7 +348,7 @@ def run_fit(arguments: argparse.Namespace) -> int:
                 "parameters": rows,
                 "movements": listed,
                 "gains": _gains(data.model.layout.joints, found),
-                "left_out": left_out_rows(unseen, begun.removeprefix("the ")),
+                "left_out": left_out_rows(unseen, row_name),
                 "sentences": said,
                 "files": [str(path) for path in written],
             }
@@ -353,7 +356,7 @@ def run_fit(arguments: argparse.Namespace) -> int:
         return 0
     print_table(rows, FITTED)
     sys.stdout.write("\n")
-    print_table(left_out_rows(unseen, begun.removeprefix("the ")), LEFT_OUT)
+    print_table(left_out_rows(unseen, row_name), LEFT_OUT)
     sys.stdout.write("".join(f"{sentence}\n" for sentence in said))
     sys.stdout.write("".join(f"{path}\n" for path in written))
     return 0

@@ -136,6 +136,7 @@ class _Script:
         self._payload: Payload | None = None
         self._commands: list[Command] = []
         self._notes: list[Note] = []
+        self._has_lines = False
         self._name = "PROGRAM"
         self._calls: Mapping[str, Callable[[ast.Call, SourcePlace], None]] = {
             "movej": self._movej,
@@ -297,8 +298,9 @@ class _Script:
 
     def _movel(self, call: ast.Call, place: SourcePlace) -> None:
         target, a, v, blend = self._move(call, "lin", (1.2, 0.25), place)
-        if not any(note.text == _TURNS for note in self._notes):
+        if not self._has_lines:
             self._notes.append(Note(place, _TURNS, Effect.SPEEDS))
+        self._has_lines = True
         full = (1.0,) * len(AXIS_NAMES)
         speeds = Speeds(full, full, v, a, _TURNING, _TURNING, 1.0)
         self._commands.append(Motion("lin", target, speeds, place, blend, payload=self._payload))

@@ -150,6 +150,10 @@ class TrajectoryReport:
         set_field(self, "contacts", tuple(self.contacts))
 
 
+FIRST_PATH = "first feasible"
+"""How the note of the stage begins that found the first free path."""
+
+
 @dataclass(frozen=True)
 class PlanningStage:
     """One stage of planning, for people who ask where the time went."""
@@ -160,6 +164,11 @@ class PlanningStage:
 
     def __post_init__(self) -> None:
         set_field(self, "seconds", finite(self.seconds, f"seconds of stage {self.name}", "s"))
+
+    @property
+    def has_first_path(self) -> bool:
+        """Whether the first free path of a request was found in it."""
+        return self.note.startswith(FIRST_PATH)
 
 
 @dataclass(frozen=True)

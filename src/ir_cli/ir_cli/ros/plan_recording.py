@@ -20,7 +20,7 @@ from ir_msgs_py.ros.conversions import status_to_msg, trajectory_to_msg
 from ir_msgs_py.ros.plan_conversions import plan_options_to_msg, program_savings_to_msg
 from ir_msgs_py.ros.power_conversions import cell_state_to_msg
 from ir_planner import Planner, ProgramPlan
-from ir_planner.before_after import assumed_doors
+from ir_planner.before_after import doors_as_assumed
 from ir_planner.node.answers import fill_program
 from ir_planner.node.topics import cell_state
 from ir_recorder.format import contents
@@ -30,7 +30,6 @@ from ir_values.files import ANYWHERE, FileRoots
 from ir_values.settings import tree
 
 _DOORS = "doors_at_the_start"
-_DOORS_ARE = "doors at the start are "
 _STEP = 1_000_000  # ns between two messages, so that their order is seen
 
 
@@ -62,8 +61,9 @@ def write_plan(
     now = time.time_ns()
     cell = planner.cell
     facts = {contents.PLAN: "never driven"}
-    if doors := assumed_doors(cell):
-        facts[_DOORS] = doors[0].removeprefix(_DOORS_ARE)
+    doors = doors_as_assumed(cell)
+    if doors:
+        facts[_DOORS] = doors
     if plan.savings.common_seconds > 0.0:
         facts[contents.COMMON_SECONDS] = f"{plan.savings.common_seconds!r} s"
     if plan.savings.common_demand > 0.0:

@@ -4,7 +4,7 @@ others.
 
 from ir_planner.before_after.comparison import before_after, before_after_common
 from ir_planner.before_after.today import Today, TodayMotion, today_of_krl
-from ir_planner.before_after.today_steps import assumed_doors
+from ir_planner.before_after.today_steps import assumed_doors, doors_as_assumed
 
 __all__ = [
     "Today",
@@ -12,5 +12,6 @@ __all__ = [
     "assumed_doors",
     "before_after",
     "before_after_common",
+    "doors_as_assumed",
     "today_of_krl",
 ]

@@ -376,11 +376,14 @@ def doors_at_the_start(
 
 def assumed_doors(cell: Cell) -> tuple[str, ...]:
     """That the cell's states are assumed, where it has machines that a signal switches."""
-    return (
-        (f"doors at the start are assumed, as the cell has them: {known}",)
-        if (known := _states(cell, ()))
-        else ()
-    )
+    known = doors_as_assumed(cell)
+    return (f"doors at the start are {known}",) if known else ()
+
+
+def doors_as_assumed(cell: Cell) -> str:
+    """The states that doors are assumed to have; "" where no signal switches a machine."""
+    known = _states(cell, ())
+    return f"assumed, as the cell has them: {known}" if known else ""
 
 
 def _states(cell: Cell, doors: Doors) -> str:

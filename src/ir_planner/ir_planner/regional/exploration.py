@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
+from ir_msgs_py.report import FIRST_PATH
 from ir_planner.checks import FreeSpace
 from ir_planner.optimize import QUICK, THOROUGH, Portfolio, Refinement
 from ir_planner.request import Context
@@ -56,9 +57,7 @@ def first_paths(
             notes.extend(filter(None, [SEARCHES.origin(name)]))
             found = search.find(ends, space, context.options.seed)
             if found.paths:
-                notes.append(
-                    f"first feasible: {len(found.paths)} free, {len(found.paths[0])} points"
-                )
+                notes.append(f"{FIRST_PATH}: {len(found.paths)} free, {len(found.paths[0])} points")
             else:
                 notes.append("nothing free" + (f", {found.note}" if found.note else ""))
         if found.correction is not None:

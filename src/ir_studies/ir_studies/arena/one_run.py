@@ -80,7 +80,6 @@ SEEDS = 100_000  # between the first requests of two seeds
 _SHARE_OF_ENDS = 0.8
 # s that a request is left to end its last step: a descent and its proof take up to these
 _LAST_STEP = 0.05
-_FIRST = "first feasible"  # how the note of the stage begins that knew the first free path
 
 
 def one_run(
@@ -204,7 +203,7 @@ def first_feasible(info: PlanningInfo) -> float:
     passed = 0.0
     for stage in info.stages:
         passed += stage.seconds
-        if stage.note.startswith(_FIRST):
+        if stage.has_first_path:
             return passed
     return math.nan
 

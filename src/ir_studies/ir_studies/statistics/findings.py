@@ -91,6 +91,12 @@ def _not_driven(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
 
 PREDICTED = "energy, predicted"
 DIRECT = "energy, direct"
+PREDICTED_TO_DIRECT = "predicted against direct"
+AGREEMENTS = (
+    (PREDICTED_TO_DIRECT, "predicted_j"),
+    ("indirect against direct", "indirect_j"),
+)
+"""Energies that are held against the directly measured one: name and column."""
 NATURAL = (
     ("duration", "duration_s", "s"),
     (PREDICTED, "predicted_j", "J"),
@@ -201,12 +207,10 @@ def findings_of(rows: Sequence[Row]) -> Findings:
         together(
             [
                 replace(
-                    compared(
-                        f"{name} against direct", driven, _field(f"{name}_j"), direct, own_pair
-                    ),
+                    compared(name, driven, _field(field), direct, own_pair),
                     unit="J",
                 )
-                for name in ("predicted", "indirect")
+                for name, field in AGREEMENTS
             ]
         ),
         _covered(driven),

@@ -25,6 +25,7 @@ from ir_studies.statistics.findings import (
     ASYNCHRONOUS,
     DIRECT,
     PREDICTED,
+    PREDICTED_TO_DIRECT,
     SYNCHRONOUS,
     Comparison,
     Findings,
@@ -500,7 +501,7 @@ def _timings(found: Findings) -> str:
 
 def _against_direct(found: Findings) -> Comparison | None:
     """Predicted against measured energies; None where none was measured."""
-    each = next((one for one in found.agreements if one.name.startswith("predicted")), None)
+    each = next((one for one in found.agreements if one.name == PREDICTED_TO_DIRECT), None)
     return each if each is not None and math.isfinite(each.mean.value) else None
 
 
