@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
+from mcap.writer import Writer
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
@@ -126,7 +127,10 @@ def test_of_topics_that_may_be_commands_none_is_read_without_being_named(tmp_pat
     with_topic(path, "/servo/in", "sensor_msgs/msg/JointState", raw, first=True)
     with sqlite3.connect(path) as file:
         file.execute("UPDATE topics SET name = '/servo/out' WHERE id = 1")
-    with pytest.raises(RecorderError, match=r"/servo/in, /servo/out are all of .* as topic: "):
+    with pytest.raises(
+        RecorderError,
+        match=r"/servo/in, /servo/out are all of .* which was measured, as topic: NAME$",
+    ):
         read_traces(path, None, NAMES)
     assert read_by(path, "topic: servo/out").columns["joint_a2"][-1] == pytest.approx(-3.8)
     assert read_by(path, "topic: /servo/in").columns["joint_a2"][-1] == pytest.approx(9.0)
@@ -169,3 +173,50 @@ def test_a_clock_that_moved_back_is_refused_and_late_messages_are_not(tmp_path: 
     late[5], late[6] = late[6], late[5]
     (trace,) = read_traces(bag(tmp_path / "late.db3", late), None, NAMES)
     assert trace.problems == ("1 joint states go back in time: left out",)
+
+
+def mcap(path: Path, topics: dict[str, list[JointState]], encoding: str = "cdr") -> Path:
+    """A bag of others in MCAP."""
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2")
+        kind = "sensor_msgs/msg/JointState"
+        schema = writer.register_schema(kind, "ros2msg", b"float64[] position")
+        for topic, messages in topics.items():
+            channel = writer.register_channel(topic, encoding, schema)
+            for k, each in enumerate(messages):
+                writer.add_message(channel, 10**9 + k, serialize_message(each), 10**9 + k)
+        writer.finish()
+    return path
+
+
+def test_a_bag_of_others_in_mcap_is_read_like_one_in_sqlite(tmp_path: Path) -> None:
+    (wanted,) = read_traces(bag(tmp_path / "run.db3", states(20)), None, NAMES)
+    (trace,) = read_traces(mcap(tmp_path / "run.mcap", {"/joint_states": states(20)}), None, NAMES)
+    assert trace.time.tolist() == wanted.time.tolist()
+    assert {name: each.tolist() for name, each in trace.columns.items()} == {
+        name: each.tolist() for name, each in wanted.columns.items()
+    }
+
+
+def test_commands_in_mcap_are_not_taken_for_states(tmp_path: Path) -> None:
+    commands = states(40)
+    for each in commands:
+        each.position = [9.0, 9.0]
+    path = mcap(tmp_path / "run.mcap", {"/servo/in": commands, "/servo/out": states(20)})
+    with pytest.raises(RecorderError, match=r"/servo/in, /servo/out are all of .* as topic: NAME$"):
+        read_traces(path, None, NAMES)
+    assert read_by(path, "topic: /servo/out").columns["joint_a2"][-1] == pytest.approx(-3.8)
+
+
+def test_a_bag_in_mcap_that_is_not_cdr_is_refused(tmp_path: Path) -> None:
+    path = mcap(tmp_path / "run.mcap", {"/joint_states": states(20)}, "json")
+    with pytest.raises(RecorderError, match="there are no messages of sensor_msgs/msg/JointState"):
+        read_traces(path, None, NAMES)
+
+
+def test_names_of_a_mapping_that_the_states_do_not_need_are_said(tmp_path: Path) -> None:
+    trace = read_by(bag(tmp_path / "run.db3", states(20)), "joints: [joint_b1, joint_b2]")
+    assert "joint_a1" in trace.columns
+    said = "joints of the mapping are not used, its states name joint_a1, joint_a2"
+    assert said in trace.problems

@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 import sqlite3
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -24,6 +25,7 @@ from ir_recorder.reading.cdr import (
     joint_groups,
     one_robot,
 )
+from ir_recorder.reading.mcap_file import read_raw
 from ir_recorder.reading.reader import TYPES, read_recording
 from ir_recorder.reading.recording import JointSeries, PowerSeries, Recording
 from ir_recorder.traces.columns import TraceMapping, Wanted
@@ -45,7 +47,7 @@ from ir_values.arrays import FloatArray
 from ir_values.errors import DescriptionError, InvalidValueError, listed
 from ir_values.extensions import Registry
 
-# Traces of ROS 2 bags in SQLite (`.db3`): the joint states of the topic that has most of them.
+# Traces of ROS 2 bags of others, in SQLite (`.db3`) or as MCAP: the joint states of one topic.
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 _SCHEMA = """\
@@ -74,11 +76,8 @@ def read_bag(path: Path, mapping: TraceMapping | None = None) -> Trace:
     """
     mapping = mapping or TraceMapping()
     os.close(opened(path))  # of a bounded size, and a regular file
-    try:
-        with sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True) as bag:
-            rows, problems = _messages(bag, path, mapping.topic)
-    except sqlite3.Error as error:
-        raise RecorderError(f"{path}: can't be read as a bag: {error}") from error
+    read = _mcap_messages if path.suffix.lower() == ".mcap" else _sqlite_messages
+    rows, problems = read(path, mapping.topic)
     fit = fitting([data for _, data in rows], JOINT_STATE, _SCHEMA)
     if not fit:
         raise RecorderError(
@@ -108,6 +107,7 @@ def read_bag(path: Path, mapping: TraceMapping | None = None) -> Trace:
     _check_clock(path, time, kept)
     found = {}
     names = robot[0] or mapping.joints
+    problems += _unused(robot[0], mapping.joints)
     paths = [field for field, _ in _FIELDS]
     if robot[0]:
         fields = by_name(columns, names, *paths)
@@ -130,6 +130,13 @@ def types_of(path: Path) -> frozenset[str]:
             return frozenset(str(row[0]) for row in bag.execute("SELECT type FROM topics"))
     except sqlite3.Error as error:
         raise RecorderError(f"{path}: can't be read as a bag: {error}") from error
+
+
+def _unused(named: Sequence[str], given: Sequence[str]) -> list[str]:
+    """A sentence where a mapping gives names to states that have names."""
+    if not (named and given):
+        return []
+    return [f"joints of the mapping are not used, its states name {', '.join(named)[:200]}"]
 
 
 def _check_names(path: Path, columns: Columns, joints: Sequence[str]) -> None:
@@ -163,24 +170,77 @@ def _check_clock(path: Path, time: FloatArray, kept: FloatArray) -> None:
         )
 
 
+def _sqlite_messages(path: Path, wanted: str) -> tuple[list[tuple[int, bytes]], list[str]]:
+    """Times [ns] and bytes of the joint states that are read, and sentences."""
+    try:
+        with sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True) as bag:
+            return _messages(bag, path, wanted)
+    except sqlite3.Error as error:
+        raise RecorderError(f"{path}: can't be read as a bag: {error}") from error
+
+
 def _messages(
     bag: sqlite3.Connection, path: Path, wanted: str
 ) -> tuple[list[tuple[int, bytes]], list[str]]:
-    """Times [ns] and bytes of the joint states that are read: of the wanted topic, else that of
-    their usual name, else the only one; and a sentence on what else is in the bag. RecorderError
-    where several could be it, as commands are of the same type.
+    """The same of an open bag."""
+    topics = [
+        _Topic(number, str(name), str(kind), count)
+        for number, name, kind, count in bag.execute(
+            "SELECT t.id, t.name, t.type, COUNT(m.id) FROM topics t JOIN messages m "
+            "ON m.topic_id = t.id GROUP BY t.id"
+        )
+    ]
+    topic, problems = _chosen(topics, path, wanted)
+    query = "SELECT timestamp, data FROM messages WHERE topic_id = ? ORDER BY timestamp, id"
+    rows = bag.execute(query, (topic.number,))
+    return [(int(time), bytes(data)) for time, data in rows], problems
+
+
+def _mcap_messages(path: Path, wanted: str) -> tuple[list[tuple[int, bytes]], list[str]]:
+    """Times [ns] and bytes of the joint states that are read of a file in MCAP, and sentences;
+    ReadError where it is none.
     """
-    topics = bag.execute(
-        "SELECT t.id, t.name, t.type, COUNT(m.id) FROM topics t JOIN messages m "
-        "ON m.topic_id = t.id GROUP BY t.id ORDER BY COUNT(m.id) DESC, t.id"
-    ).fetchall()
-    states = [each for each in topics if each[2] == JOINT_STATE]
+    raw = read_raw(path)
+    topics = [
+        _Topic(number, each.topic, each.type, len(each.messages))
+        for number, each in enumerate(raw.channels)
+        if each.messages and each.message_encoding == "cdr"
+    ]
+    problems = list(raw.problems)
+    problems += [
+        f"{each.topic[:100]} is {each.message_encoding[:40]}, not cdr: left out"
+        for each in raw.channels
+        if each.messages and each.message_encoding != "cdr"
+    ]
+    topic, said = _chosen(topics, path, wanted)
+    channel = raw.channels[topic.number]
+    times = channel.log_time.tolist()
+    return list(zip(times, channel.messages, strict=True)), problems + said
+
+
+@dataclass(frozen=True)
+class _Topic:
+    """A topic of a bag with messages: its number there, name, type, and how many it has."""
+
+    number: int
+    name: str
+    kind: str
+    count: int
+
+
+def _chosen(topics: list[_Topic], path: Path, wanted: str) -> tuple[_Topic, list[str]]:
+    """The joint states that are read: of the wanted topic, else that of their usual name, else the
+    only one; and a sentence on what else is in the bag. RecorderError where several could be it, as
+    commands are of the same type.
+    """
+    topics = sorted(topics, key=lambda each: (-each.count, each.number))
+    states = [each for each in topics if each.kind == JOINT_STATE]
     if not states:
         raise RecorderError(f"{path}: there are no messages of {JOINT_STATE} in it")
-    named = [each for each in states if str(each[1]).rpartition("/")[2] == _JOINT_STATES]
+    named = [each for each in states if each.name.rpartition("/")[2] == _JOINT_STATES]
     if wanted:
-        named = [each for each in states if str(each[1]).strip("/") == wanted.strip("/")]
-    several = [str(each[1])[:100] for each in named or states]
+        named = [each for each in states if each.name.strip("/") == wanted.strip("/")]
+    several = [each.name[:100] for each in named or states]
     if wanted and not named:
         raise RecorderError(
             f"{path}: there is no topic {wanted[:100]} of {JOINT_STATE}, there is "
@@ -189,19 +249,17 @@ def _messages(
     if len(several) > 1:
         raise RecorderError(
             f"{path}: {listed(several, 8)} are all of {JOINT_STATE}, states or commands: a mapping "
-            f"(--mapping) says which to read, as topic: {several[0]}"
+            "(--mapping) says which was measured, as topic: NAME"
         )
-    topic, name, _, count = (named or states)[0]
-    if count > _MOST:
-        raise RecorderError(f"{path}: has {count} joint states, at most {_MOST} are read")
-    others = [f"{own} ({kind})"[:100] for each, own, kind, _ in topics if each != topic]
-    problems = []
+    topic = (named or states)[0]
+    if topic.count > _MOST:
+        raise RecorderError(f"{path}: has {topic.count} joint states, at most {_MOST} are read")
+    others = [f"{each.name} ({each.kind})"[:100] for each in topics if each != topic]
     if others:
-        problems.append(f"read is {str(name)[:100]}; topics that are not: {listed(others, 8)}")
-    elif str(name).rpartition("/")[2] != _JOINT_STATES:
-        problems.append(f"read is {str(name)[:100]}, the only topic of {JOINT_STATE}")
-    query = "SELECT timestamp, data FROM messages WHERE topic_id = ? ORDER BY timestamp, id"
-    return [(int(time), bytes(data)) for time, data in bag.execute(query, (topic,))], problems
+        return topic, [f"read is {topic.name[:100]}; topics that are not: {listed(others, 8)}"]
+    if topic.name.rpartition("/")[2] != _JOINT_STATES:
+        return topic, [f"read is {topic.name[:100]}, the only topic of {JOINT_STATE}"]
+    return topic, []
 
 
 # Traces of a recording: the joints' and the meter's, each with its own instants.
@@ -312,7 +370,7 @@ def read_traces(
     elif ending == ".db3":
         found = _of_bag(path, mapping)
     elif ending == ".mcap":
-        found = recorded_traces(read_recording(path))
+        found = _of_mcap(path, mapping)
     else:
         found = _installed(path, ending)
     return tuple(_shifted(trace, mapping) for trace in found)
@@ -323,6 +381,19 @@ def _of_bag(path: Path, mapping: TraceMapping) -> tuple[Trace, ...]:
     if POWER_TYPE in types_of(path):
         return recorded_traces(read_recording(path))
     return (read_bag(path, mapping),)
+
+
+def _of_mcap(path: Path, mapping: TraceMapping) -> tuple[Trace, ...]:
+    """The same of a file in MCAP."""
+    recording = read_recording(path)
+    if is_own(recording):
+        return recorded_traces(recording)
+    return (read_bag(path, mapping),)
+
+
+def is_own(recording: Recording) -> bool:
+    """Whether it is a recording of this project, not a bag of joint states of another."""
+    return recording.power is not None or bool(recording.cell_yaml)
 
 
 def _installed(path: Path, ending: str) -> tuple[Trace, ...]:
