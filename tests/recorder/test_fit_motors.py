@@ -24,7 +24,7 @@ from ir_recorder.fit import (
     shaft_work,
     write_fit_picture,
 )
-from ir_recorder.fit.fit_data import DataSource, fit_data, without_turns
+from ir_recorder.fit.fit_data import DataSource, check_efforts, fit_data, without_turns
 from ir_recorder.measure import PowerModel, Samples, samples_of
 from ir_recorder.measure.arm import arm_torques
 from ir_recorder.traces import Trace
@@ -382,3 +382,13 @@ def test_the_clock_of_a_slow_meter_is_found(period: float, shift: float, tmp_pat
     (said,) = (note for note in data.notes if "on its clock" in note)
     found = float(said.split(": ")[1].split(" s ")[0])
     assert found == pytest.approx(-shift, abs=0.02)
+
+
+def test_efforts_that_are_zero_though_the_joint_moves_were_not_measured() -> None:
+    time = np.arange(0.0, 2.0, 0.01)
+    columns = {"a": np.sin(time), "b": np.zeros(len(time))}
+    efforts = {"a_effort": np.zeros(len(time)), "b_effort": np.zeros(len(time))}
+    with pytest.raises(RecorderError, match="a_effort is 0 all the time, though a moves"):
+        check_efforts(Trace("log", time, columns | efforts), ("a", "b"))
+    efforts["a_effort"] = np.cos(time)
+    check_efforts(Trace("log", time, columns | efforts), ("a", "b"))

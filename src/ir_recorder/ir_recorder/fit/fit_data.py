@@ -19,7 +19,7 @@ from ir_recorder.measure.samples import MOVING, STEP, LoadRuns
 from ir_recorder.reading.reader import read_recording
 from ir_recorder.reading.recording import Recording
 from ir_recorder.traces import ClockOffset, Trace, TraceMapping, clock_offset, read_traces
-from ir_recorder.traces.reader import recorded_traces
+from ir_recorder.traces.reader import is_own, recorded_traces
 from ir_recorder.traces.trace import CURRENT, EFFORT, LOAD, VELOCITY
 from ir_values.arrays import BoolArray, FloatArray
 from ir_values.errors import InvalidValueError
@@ -214,6 +214,28 @@ def check_clock(joints: Trace, names: Sequence[str]) -> None:
             )
 
 
+_TURNED = 0.05  # rad: a joint that moves
+
+
+def check_efforts(joints: Trace, names: Sequence[str]) -> None:
+    """RecorderError where the effort of a joint that moves is 0 all the time, as drivers write it
+    that measure none.
+    """
+    positions = joints.joints(names)
+    kind = EFFORT if joints.joints(names, EFFORT) is not None else CURRENT
+    efforts = joints.joints(names, kind)
+    if positions is None or efforts is None:
+        return
+    moves = np.nanmax(positions, axis=0) - np.nanmin(positions, axis=0) > _TURNED
+    silent = moves & ~np.nan_to_num(efforts).any(axis=0)
+    if silent.any():
+        name = names[int(silent.argmax())]
+        raise RecorderError(
+            f"{joints.source}: {name}{kind} is 0 all the time, though {name} moves: was it "
+            "measured? Name the meter's file, or leave such a column out"
+        )
+
+
 def _times_as_fast(moved: FloatArray, said: FloatArray) -> float:
     """How many times as fast a joint moves, by its positions (N,), as its recorded speed (N,) says;
     1 where the two are not of one motion, or of none.
@@ -266,8 +288,13 @@ class DataSource:
 
     @cached_property
     def recording(self) -> Recording | None:
-        """The recording that the motion is from, read once; None for other files."""
-        return read_recording(self.motion) if self.motion.suffix.lower() == ".mcap" else None
+        """The recording that the motion is from, read once; None for other files, and for bags of
+        others.
+        """
+        if self.motion.suffix.lower() != ".mcap":
+            return None
+        recording = read_recording(self.motion)
+        return recording if is_own(recording) else None
 
     def on_clock(self, seconds: float) -> DataSource:
         """The source with so many seconds added to the meter's clock."""
@@ -362,13 +389,8 @@ def _run(
             added = offset.seconds if meter is None else np.nan
         meter = outer
     names = cell.robot.joint_names
-    said = joints.joints(names, EFFORT) is not None or joints.joints(names, CURRENT) is not None
-    if (by in BY[1:] or meter is None) and not said:
-        what = "" if by in BY[1:] else "neither a column power nor energy, and "
-        raise RecorderError(
-            f"{source.motion}: there is {what}no column {names[0]}{EFFORT} nor "
-            f"{names[0]}{CURRENT}; name the meter's file"
-        )
+    if by in BY[1:] or meter is None:
+        _check_motors(source, joints, names, by)
     if meter is not None and by != BY[1]:
         check_readings(meter)
     notes += _gaps(joints)
@@ -377,6 +399,19 @@ def _run(
     if meter is not None and by != BY[1]:
         check_unit(samples.watts, cell.robot, meter.source)
     return samples, notes, added
+
+
+def _check_motors(source: DataSource, joints: Trace, names: Sequence[str], by: str) -> None:
+    """RecorderError where a fit by the motors has neither torques nor currents, or such as nobody
+    measured.
+    """
+    if joints.joints(names, EFFORT) is None and joints.joints(names, CURRENT) is None:
+        what = "" if by in BY[1:] else "neither a column power nor energy, and "
+        raise RecorderError(
+            f"{source.motion}: there is {what}no column {names[0]}{EFFORT} nor "
+            f"{names[0]}{CURRENT}; name the meter's file"
+        )
+    check_efforts(joints, names)
 
 
 def _said(traces: Sequence[Trace]) -> list[str]:
