@@ -415,9 +415,19 @@ class RailIk:
         data.poses(targets, "poses")
         count = len(self.places)
         moved = np.repeat(targets, count, axis=0)
-        moved[:, :3, 3] -= np.tile(self.places, len(targets))[:, None] * self._along
-        found = self._arm.solve(np.ascontiguousarray(moved))
-        q = np.column_stack([self.places[found.pose_index % count], found.q])
+        return self._solved(moved, np.tile(self.places, len(targets)), count)
+
+    def solve_each(self, poses: ArrayLike, places: ArrayLike) -> IkSet:
+        """The same for poses (N, 4, 4), each with the rail at a place of its own (N,) [m]."""
+        targets = shaped("poses", poses, None, 4, 4)
+        data.poses(targets, "poses")
+        return self._solved(np.array(targets), data.array(places, "places", (len(targets),)), 1)
+
+    def _solved(self, poses: FloatArray, places: FloatArray, count: int) -> IkSet:
+        """Of poses (N * count, 4, 4) with the rail at places (N * count,) [m], `count` of each."""
+        poses[:, :3, 3] -= places[:, None] * self._along
+        found = self._arm.solve(np.ascontiguousarray(poses))
+        q = np.column_stack([places[found.pose_index], found.q])
         arrays = np.ascontiguousarray(q), found.pose_index // count, found.branch
         return IkSet(*(data.read_only(np.array(array)) for array in arrays))
 

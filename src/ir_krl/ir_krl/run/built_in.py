@@ -61,6 +61,7 @@ CONTROLLERS = frozenset(
 """Modules that come with a controller: what they are here counts, not their text in a folder."""
 
 _FAR = 1e6  # mm: bounds nothing
+_EXTERNAL_TOO = {"$VEL_AXIS": "$VEL_EXTAX", "$ACC_AXIS": "$ACC_EXTAX"}
 _MATHEMATICS: dict[str, Callable[..., float]] = {
     "ABS": abs,
     "SQRT": math.sqrt,
@@ -196,6 +197,8 @@ class Library:
         memory = self._memory
         memory.shared["$VEL_AXIS"] = all_axes(FULL)
         memory.shared["$ACC_AXIS"] = all_axes(FULL)
+        memory.shared["$VEL_EXTAX"] = all_axes(FULL)
+        memory.shared["$ACC_EXTAX"] = all_axes(FULL)
         self._axis_speed(FULL)
         self._set("$ACC_AXIS", FULL)
         for variable, parts in (
@@ -302,6 +305,8 @@ class Library:
 
     def _set(self, name: str, value: Value) -> None:
         """A system variable; of an array of axes all of them."""
+        if name in _EXTERNAL_TOO:  # BAS and the forms set external axes with the robot's
+            self._set(_EXTERNAL_TOO[name], value)
         variable, _, component = name.partition(".")
         held = self._memory.shared.get(variable)
         if isinstance(held, Array):

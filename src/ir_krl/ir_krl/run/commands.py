@@ -52,6 +52,12 @@ class Target:
     external: bool = False
     rail: float | None = None
 
+    def rail_after(self, now: FloatArray) -> FloatArray:
+        """Where (1,) [m] a rail is at the target, from `now` (1,) on; (0,) without a rail."""
+        if self.rail is None:
+            return now
+        return now + self.rail if self.relative else np.full_like(now, self.rail)
+
     def flange(self, pose: FloatArray) -> FloatArray:
         """The flange (..., 4, 4) [m] in the robot's foot where the tool is at `pose` (..., 4, 4) in
         the base, or in the workpiece.
@@ -74,7 +80,8 @@ class Target:
 class Speeds:
     """How fast: shares (6,) of the axes' speeds and accelerations; velocity [m/s] and acceleration
     [m/s^2] of the tool, turning [rad/s] and turning_acceleration [rad/s^2] of its orientation;
-    override: share of all speeds. jerk [m/s^3], turning_jerk [rad/s^3] of the tool and axis_jerk,
+    override: share of all speeds. external_velocity, external_acceleration: shares of those of a
+    rail. jerk [m/s^3], turning_jerk [rad/s^3] of the tool and axis_jerk,
     shares (6,) of the axes' jerk, bound motions of the spline kind alone.
     """
 
@@ -88,6 +95,8 @@ class Speeds:
     jerk: float = math.inf
     turning_jerk: float = math.inf
     axis_jerk: tuple[float, ...] = (1.0,) * AXES
+    external_velocity: float = 1.0
+    external_acceleration: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -228,6 +228,7 @@ _STANDS = 1e-3  # mm or deg: an external axis that moves by less stands
 _SLOWEST = 1e-6  # m/s, deg/s, m/s^2, deg/s^2 or %: a movement of years
 _KINDS: dict[str, Kind] = {kind: kind for kind in get_args(Kind)}
 _MM = 1e-3  # m
+_ALL_JERK = (math.inf, math.inf, (1.0,) * AXES)  # of the tool, of its turning, of the axes
 _BLEND_WORDS = {"C_PTP": "CPTP", "C_DIS": "CDIS", "C_ORI": "CORI", "C_VEL": "CVEL", "C_SPL": "CDIS"}
 
 
@@ -271,6 +272,12 @@ class Motions:
             raise KrlRunError(
                 f"{word} goes to a frame, not to axis angles: PTP goes to those", place
             )
+        if kind == "ptp" and end.frame == {}:
+            raise KrlRunError(
+                f"{word} to {RAIL_NAME} alone: {{E6AXIS: {RAIL_NAME} …}} leaves A1 to A6 as they "
+                "are, a whole frame says where the tool is",
+                place,
+            )
         if kind != "ptp":
             self._note_orientation(kind, place)
         blend = next(
@@ -310,6 +317,8 @@ class Motions:
         base, tool = self.frames(place)
         name = str(tree.children[0]) if tree.data == "access" else ""
         place_of_rail = rail(value, place) if self._on_rail else None
+        frame = components(value, FRAME_NAMES, place)
+        rail_alone = place_of_rail is not None and not frame and not is_axis_value(value)
 
         def target(
             given: dict[str, float] | None,
@@ -331,10 +340,9 @@ class Motions:
                 place_of_rail,
             )
 
-        if is_axis_value(value):
+        if is_axis_value(value) or (rail_alone and value.kind == "E6AXIS"):
             return target(axes(value, place))
-        frame = components(value, FRAME_NAMES, place)
-        if not frame:
+        if not frame and not rail_alone:
             point = name or "POINT"
             raise KrlRunError(
                 f"a motion can't go to {kind_of(value)}: it has neither X, Y, Z nor A1 to A6; "
@@ -423,6 +431,7 @@ class Motions:
             tuple(self._share(name, (j,), place) if axis else 1.0 for j in range(1, AXES + 1))
             for name in ("$VEL_AXIS", "$ACC_AXIS")
         )
+        jerk, turning_jerk, axis_jerk = self._jerks(place) if spline else _ALL_JERK
         return Speeds(
             velocity,
             acceleration,
@@ -431,8 +440,16 @@ class Motions:
             math.radians(self._positive("$VEL", "ORI1", place)),
             math.radians(self._positive("$ACC", "ORI1", place)),
             self._share("$OV_PRO", None, place),
-            *(self._jerks(place) if spline else ()),
+            jerk,
+            turning_jerk,
+            axis_jerk,
+            external_velocity=self._external_share("$VEL_EXTAX", place),
+            external_acceleration=self._external_share("$ACC_EXTAX", place),
         )
+
+    def _external_share(self, name: str, place: SourcePlace) -> float:
+        """What a system variable leaves of a rail's speed or acceleration."""
+        return self._share(name, (int(RAIL_NAME[1:]),), place) if self._on_rail else 1.0
 
     def _jerks(self, place: SourcePlace) -> tuple[float, float, tuple[float, ...]]:
         """$JERK.CP [m/s^3], $JERK.ORI [rad/s^3], inf where none is set, and what $GEAR_JERK leaves

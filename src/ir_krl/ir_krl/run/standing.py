@@ -15,6 +15,7 @@ from ir_krl.run.system import AXES, axis_fields
 from ir_krl.run.values import (
     AXIS_NAMES,
     FRAME_NAMES,
+    RAIL_NAME,
     Structure,
     Unknown,
     Value,
@@ -53,6 +54,8 @@ class Standing:
     kinematics: Kinematics | None = None
     _replayed: int = 0  # commands that `_q` stands behind
     _q: FloatArray | None = None
+    _slid: int = 0  # commands that `_rails` stands behind
+    _rails: FloatArray | None = None
 
     @property
     def moved(self) -> bool:
@@ -76,6 +79,7 @@ class Standing:
             flange = _written(target)
             known = {"S": target.status, "T": target.turn}
             state: dict[str, Value] = {k: v for k, v in known.items() if v is not None}
+            state |= _rail_fields(self._rail())
         else:
             q = self._configuration()
             if q is None or self.kinematics is None:
@@ -106,7 +110,18 @@ class Standing:
         """The E6POS of the configuration q (n,) whose flange is known."""
         assert self.kinematics is not None
         status, turn = self.kinematics.status_turn(q)
-        return Structure({**frame(frames.pose(flange)).fields, "S": status, "T": turn}, "E6POS")
+        state: dict[str, Value] = {"S": status, "T": turn, **_rail_fields(q[:-AXES])}
+        return Structure({**frame(frames.pose(flange)).fields, **state}, "E6POS")
+
+    def _rail(self) -> FloatArray:
+        """Where (1,) [m] the motions so far lead a rail; (0,) without one."""
+        now = self.home[:-AXES] if self._rails is None else self._rails
+        for command in self.commands[self._slid :]:
+            for motion in _motions_of(command):
+                now = motion.target.rail_after(now)
+        self._slid = len(self.commands)
+        self._rails = now
+        return now
 
     def _last(self) -> Target | None:
         """Where the last motion leads; None before the first one, and where a circle ends by its
@@ -138,6 +153,11 @@ class Standing:
         self._replayed = len(self.commands)
         self._q = q
         return q
+
+
+def _rail_fields(rails: FloatArray) -> dict[str, Value]:
+    """E1 [mm] of a rail (1,) [m]; nothing without one (0,)."""
+    return {RAIL_NAME: real(float(rails[0]) / _MM)} if len(rails) else {}
 
 
 def _angles(q: FloatArray) -> Structure:

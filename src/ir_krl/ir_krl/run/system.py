@@ -30,6 +30,8 @@ MODELLED = frozenset(
     (
         "$VEL_AXIS",
         "$ACC_AXIS",
+        "$VEL_EXTAX",
+        "$ACC_EXTAX",
         "$VEL",
         "$ACC",
         "$APO",
@@ -65,8 +67,6 @@ HARMLESS = frozenset(
         "$TORQMON_DEF",
         "$TORQMON_COM",
         "$TORQMON_COM_DEF",
-        "$VEL_EXTAX",
-        "$ACC_EXTAX",
         "$ERR",
         "$ANOUT",
         "$FCT_CALL",
@@ -311,6 +311,8 @@ def system_variables(
         **FACTS,
         "$VEL_AXIS": all_axes(FULL),
         "$ACC_AXIS": all_axes(FULL),
+        "$VEL_EXTAX": all_axes(FULL),
+        "$ACC_EXTAX": all_axes(FULL),
         "$VEL": Structure({"CP": DEFAULTS["DEF_VEL_CP"], **turning}),
         "$ACC": Structure({"CP": DEFAULTS["DEF_ACC_CP"], **turning_up}),
         "$APO": Structure({p: DEFAULTS[f"DEF_APO_{p}"] for p in ("CPTP", "CDIS", "CORI", "CVEL")}),
@@ -356,6 +358,9 @@ def assumed_variables(forms: FormAge = FormAge.OPEN) -> dict[str, Assumption]:
     for n in range(1, AXES + 1):
         found[f"$VEL_AXIS[{n}]"] = Assumption(axis, Effect.SPEEDS)
         found[f"$ACC_AXIS[{n}]"] = Assumption(axis, Effect.SPEEDS)
+    external = f"$VEL_EXTAX or $ACC_EXTAX isn't set: {RAIL_NAME} has all of its speed"
+    for name in ("$VEL_EXTAX", "$ACC_EXTAX"):
+        found[f"{name}[{RAIL_NAME[1:]}]"] = Assumption(external, Effect.SPEEDS)
     for name, unit in DELIVERED.items():
         said = f"{name} {DEFAULTS[name]:g} {unit}"
         found[name] = Assumption(said, Effect.SPEEDS, delivered=name)

@@ -7,7 +7,14 @@ import math
 import numpy as np
 
 from ir_krl.errors import SourcePlace
-from ir_krl.run.values import AXIS_NAMES, FRAME_NAMES, components, frame
+from ir_krl.run.system import AXES
+from ir_krl.run.values import (
+    AXIS_NAMES,
+    EXTERNAL_NAMES,
+    FRAME_NAMES,
+    components,
+    frame,
+)
 from ir_krl.write.statements import Style, WrittenMove
 from ir_values.arrays import FloatArray
 
@@ -62,9 +69,13 @@ def _declared(part: WrittenMove, n: int, numbers: _Numbers, style: Style) -> lis
             f"DECL PDAT PPDAT{n}={{VEL 100.0,ACC {part.acceleration}.0,"
             f"APO_DIST {part.rounded:.1f}{mode}}}"
         )
-    external = ",".join(f"E{k} 0.0" for k in range(1, 7))
+    rails = part.joints[:-AXES]
+    arm = part.joints[-AXES:]
+    values = [*(decimal(1e3 * place, 6) for place in map(float, rails)), *["0.0"] * 6]
+    named = zip(EXTERNAL_NAMES, values, strict=False)
+    external = ",".join(f"{name} {value}" for name, value in named)
     if _is_posture(part):
-        angles = zip(AXIS_NAMES, np.degrees(part.joints), strict=True)
+        angles = zip(AXIS_NAMES, np.degrees(arm), strict=True)
         fields = ",".join(f"{name} {decimal(angle, 7)}" for name, angle in angles)
         point = f"DECL E6AXIS XP{n}={{{fields},{external}}}"
     else:
@@ -79,7 +90,8 @@ def _is_posture(part: WrittenMove) -> bool:
     """Whether the axes say where a PTP in the robot's foot leads: near A5 = 0 a pose leaves A4 and
     A6 to rounding.
     """
-    singular = len(part.joints) > _WRIST and abs(part.joints[_WRIST]) < _STRETCHED
+    arm = part.joints[-AXES:]
+    singular = len(arm) > _WRIST and abs(arm[_WRIST]) < _STRETCHED
     return bool(singular) and not part.straight and part.base == 0
 
 

@@ -10,7 +10,7 @@ from ir_kernels import portable
 from ir_krl.errors import KrlError
 from ir_krl.run.commands import Payload
 from ir_krl.run.system import axis_fields
-from ir_krl.run.values import FRAME_NAMES
+from ir_krl.run.values import FRAME_NAMES, RAIL_NAME
 from ir_krl.write.forms import Forms, decimal, frame_text
 from ir_krl.write.identifiers import INPUT, OUTPUT, WIDTHS, Numbers, Wiring, check_name
 from ir_krl.write.numbering import BASES_MAX, TOOL_HIGHEST
@@ -280,8 +280,8 @@ class _Body:
         self._movements += 1
         names = [f"XM{self._movements}_{k + 1}" for k in range(len(part.poses))]
         self.points += [
-            f"DECL E6POS {n}={{{frame_text(pose, 7)}}}"
-            for n, pose in zip(names, part.poses, strict=True)
+            f"DECL E6POS {n}={{{frame_text(pose, 7)}{_rail(rail)}}}"
+            for n, pose, rail in zip(names, part.poses, part.rails, strict=True)
         ]
         self.lines += [
             f"; {part.comment}",
@@ -328,6 +328,11 @@ def _axes(q: FloatArray) -> str:
     """A configuration (6,) [rad], of a robot on a rail with E1 [m] first, as E6AXIS."""
     fields = axis_fields(q).items()
     return "{" + ",".join(f"{name} {decimal(value, 7)}" for name, value in fields) + "}"
+
+
+def _rail(rails: FloatArray) -> str:
+    """E1 [mm] of a rail (1,) [m] behind a frame; nothing without one (0,)."""
+    return "".join(f",{RAIL_NAME} {decimal(1e3 * place, 6)}" for place in map(float, rails))
 
 
 def _tool(tool: FloatArray) -> str:

@@ -41,19 +41,21 @@ class WrittenSpline:
 @dataclass(frozen=True, eq=False)
 class WrittenPath:
     """A SPLINE of the tool: poses (M, 4, 4) [m] in the robot's foot after the start, at a speed
-    [m/s] and an acceleration [m/s^2] of the tool.
+    [m/s] and an acceleration [m/s^2] of the tool; rails (M, 1): E1 [m] of a robot on a rail, (M, 0)
+    without one.
     """
 
     comment: str
     poses: FloatArray
     speed: float
     acceleration: float
+    rails: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
 class WrittenMove:
     """An inline form to `pose` (4, 4) [m] of the tool in the robot's foot, with its status and
-    turn, at `joints` (n,) [rad].
+    turn, at `joints` (n,) [rad], of a robot on a rail E1 [m] first.
 
     straight: a line of the tool, else of the axes; velocity: [m/s], else [%]; acceleration [%];
     rounded: how far around its end it is left for the next motion, [mm] (krc2, not straight: [%]),

@@ -11,7 +11,7 @@ import numpy as np
 
 from ir_kernels import portable
 from ir_krl import KrlMotionError, Motion, SourcePlace
-from ir_krl.run import Blend, Speeds, Target
+from ir_krl.run import Blend, Effect, Note, Speeds, Target
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.cartesian import Arc, Line, arc_through
 from ir_planner.curves import turn_of, turned_evenly
@@ -32,6 +32,7 @@ _SAMPLES_MIN = 17
 _SAMPLES_MAX = 20_001
 _JUMP = np.radians(20.0)  # of an axis between samples: the path passes a singularity
 _DEGREE = 5
+_RAIL_SAME = 1e-3  # m
 
 
 class AxisPath(Protocol):
@@ -143,29 +144,49 @@ def tool_curve(motion: Motion, start: FloatArray, arm: Arm) -> AxisCurve:
     """A LIN or CIRC from the configuration `start` (n,). Raises KrlMotionError."""
     first, last, path = tool_ends(motion, start, arm)
     turning = float(turn_of(portable.matmul(first[:3, :3].T, last[:3, :3])))
-    fine = np.ceil(max(path.length / _STEP_M, turning / _STEP_RAD)) + 1
+    slid = arm.rail_at(motion.target, start, motion.place) - start[: arm.scene.cell.robot.base]
+    _note_auxiliary(motion, start[: len(slid)], slid, arm)
+    longest = max(path.length, float(np.abs(slid).max(initial=0.0)))
+    fine = np.ceil(max(longest / _STEP_M, turning / _STEP_RAD)) + 1
     u = np.linspace(0.0, 1.0, int(np.clip(fine, _SAMPLES_MIN, _SAMPLES_MAX)))
     poses = np.tile(np.eye(4), (len(u), 1, 1))
     poses[:, :3, 3] = path.at(u * path.length)
     poses[:, :3, :3] = turned_evenly(first[:3, :3], last[:3, :3], u)
-    q = followed(poses, motion, start, arm)
+    rails = start[: len(slid)] + u[:, None] * slid  # E1 moves evenly with the tool
+    q = followed(poses, rails, motion, start, arm)
     return AxisCurve(portable.interpolating_spline(u, q, _DEGREE), path.length, turning)
 
 
-def followed(poses: FloatArray, motion: Motion, start: FloatArray, arm: Arm) -> FloatArray:
-    """Configurations (N, n) along tool poses (N, 4, 4), each the nearest to the one before; the
-    first is `start`. Raises KrlMotionError where the path leaves the reach or an axis jumps.
+def _note_auxiliary(motion: Motion, rail: FloatArray, slid: FloatArray, arm: Arm) -> None:
+    """Note a place of the rail that only the auxiliary point of an SCIRC names: CIRC ignores it."""
+    if motion.via is None or not motion.spline:
+        return
+    beside = motion.via.rail_after(rail) - rail
+    low = np.minimum(slid, 0.0) - _RAIL_SAME
+    high = np.maximum(slid, 0.0) + _RAIL_SAME
+    if ((beside < low) | (beside > high)).any():
+        text = "E1 of the auxiliary point isn't passed: it moves evenly to that of the end"
+        arm.noted(Note(motion.place, text, Effect.PLACES))
+
+
+def followed(
+    poses: FloatArray, rails: FloatArray, motion: Motion, start: FloatArray, arm: Arm
+) -> FloatArray:
+    """Configurations (N, n) along tool poses (N, 4, 4) with the rail at (N, 1) [m], (N, 0) without
+    one, each the nearest to the one before; the first is `start`. Raises KrlMotionError where the
+    path leaves the reach or an axis jumps.
     """
     q = np.empty((len(poses), len(start)))
     q[0] = start
-    for k, found in enumerate(arm.configurations(poses[1:], motion.target), start=1):
+    found_along = arm.configurations(poses[1:], rails[1:], motion.target)
+    for k, found in enumerate(found_along, start=1):
         where = f"{100.0 * k / (len(poses) - 1):.0f} % along"
         if len(found) == 0:
             raise KrlMotionError(
                 f"{_name(motion)}: the path leaves the reach or an axis limit {where}", motion.place
             )
-        nearest = found[np.argmin(np.abs(found - q[k - 1]).max(axis=1))]
-        jump = np.abs(nearest - q[k - 1])
+        nearest = arm.nearest(found, q[k - 1])
+        jump = np.abs(nearest - q[k - 1])[rails.shape[1] :]
         if jump.max() > _JUMP:
             j = int(jump.argmax())
             raise KrlMotionError(
@@ -264,13 +285,14 @@ def move(
 
 def _axis_limits(speeds: Speeds, limits: MotionLimits) -> MotionLimits:
     """What the program leaves of the axes' limits."""
-    rails = np.ones(len(limits.velocity) - len(speeds.axis_velocity))  # no program bounds them
-    share = np.append(rails, speeds.axis_acceleration)
+    rails = len(limits.velocity) - len(speeds.axis_velocity)
+    share = np.array([*[speeds.external_acceleration] * rails, *speeds.axis_acceleration])
     kept = replace(
         limits,
-        velocity=limits.velocity * np.append(rails, speeds.axis_velocity),
+        velocity=limits.velocity
+        * np.array([*[speeds.external_velocity] * rails, *speeds.axis_velocity]),
         acceleration=limits.acceleration * share,
-        jerk=limits.jerk * np.minimum(share, np.append(rails, speeds.axis_jerk)),
+        jerk=limits.jerk * np.minimum(share, np.array([*[1.0] * rails, *speeds.axis_jerk])),
     )
     return kept.for_speed(speeds.override)
 

@@ -383,8 +383,10 @@ class _Drive:
             curve: AxisPath = AxisLine(self.here, end)
             drawn = None
         else:
+            rail = self.here[: self.scene.cell.robot.base]
             curve = tool_curve(motion, self.here, self.arm)
-            if max(curve.length, curve.turning) < STILL:
+            slid = np.abs(motion.target.rail_after(rail) - rail).max(initial=0.0)
+            if max(curve.length, curve.turning, slid) < STILL:
                 self._at_once(triggered)
                 return
             drawn = tool_motion(motion, self.here, self.arm)

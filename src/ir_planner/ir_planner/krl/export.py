@@ -11,7 +11,7 @@ from ir_description import Cell
 from ir_description.poses import inverse
 from ir_kernels import portable
 from ir_krl import Followed, KrlError
-from ir_krl.run import Payload
+from ir_krl.run import RAIL_NAME, Payload
 from ir_krl.write import (
     BASES_MAX,
     Attached,
@@ -111,21 +111,13 @@ def export(
         raise RequestError(StatusCode.INVALID_MOTION_PLAN, "the program has no movement to export")
     check_name(name)
     check_rail(scene)
-    if scene.cell.robot.rail is not None:
-        _check_style_on_rail(moving, style)
-    asked = numbers or FrameNumbers()
-    return _Job(steps, name, scene, evaluator, times, check_style(style), around, asked).done()
-
-
-def _check_style_on_rail(moving: Sequence[PlannedMovement], style: str) -> None:
-    """Refuse what can't say where a rail is meanwhile."""
-    if style != "spline" or any(step.kind == MovementKind.CARTESIAN for step in moving):
-        what = "a path of the tool" if style == "spline" else f"style {style}"
+    if scene.cell.robot.rail is not None and style == "urscript":
         raise RequestError(
             StatusCode.INVALID_MOTION_PLAN,
-            f"{what} isn't written for a robot on a rail: movements in style spline are "
-            "(PTP_SPLINE, which moves E1)",
+            "style urscript moves no rail: a robot on one is written in style spline, kss8 or krc2",
         )
+    asked = numbers or FrameNumbers()
+    return _Job(steps, name, scene, evaluator, times, check_style(style), around, asked).done()
 
 
 @dataclass(frozen=True, eq=False)
@@ -400,6 +392,11 @@ class _Job:
         ]
         if remark := make_remark(self._style, cell.robot):
             lines.append(f"note: {remark}")
+        if cell.robot.rail is not None:
+            lines.append(
+                f"{RAIL_NAME} carries the robot, as a coupled linear unit of the machine data "
+                f"(#ERSYS): frames count from where its foot is at {RAIL_NAME} = 0"
+            )
         if cell_hash := next(
             (step.report.cell_hash for step in self._steps if step.report.cell_hash), ""
         ):

@@ -163,23 +163,14 @@ class Arm:
         """S and T of a configuration q (n,) [rad]."""
         return status_turn(self.scene.chain, q)
 
-    def configurations(self, poses: FloatArray, target: Target) -> list[FloatArray]:
+    def configurations(
+        self, poses: FloatArray, rails: FloatArray, target: Target
+    ) -> list[FloatArray]:
         """All configurations (m, n) within the limits for each tool pose (N, 4, 4) in the target's
-        base. Raises RequestError for a robot on a rail: where that is along a path, no program
-        says.
+        base, with the rail at places (N, 1) [m] of their own; (N, 0) without one.
         """
-        if self.scene.chain.first_slides:
-            raise RequestError(
-                StatusCode.INVALID_GOAL_CONSTRAINTS,
-                "motions of the tool (LIN, CIRC, SPL and their splines) are followed without a "
-                "rail only: PTP and PTP_SPLINE move E1",
-            )
-        return self._solutions(poses, target, np.zeros(1))
-
-    def _solutions(self, poses: FloatArray, target: Target, places: FloatArray) -> list[FloatArray]:
-        """The same with the rail at these places (P,) [m]."""
         tcp = self.tcp(target.flange(poses))
-        found = self.scene.inverse_kinematics_at(places).solve(tcp)
+        found = self.scene.inverse_kinematics_along(tcp, rails)
         return [found.of_pose(k) for k in range(len(poses))]
 
     def reached(self, target: Target, q: FloatArray, place: SourcePlace) -> FloatArray:
@@ -192,13 +183,12 @@ class Arm:
             for name, angle in target.axes.items():
                 j = int(name[1:]) - 1 + base
                 end[j] = q[j] + angle if target.relative else angle
-            end[:base] = self._rail_after(target, q)[:base]
-            self._check_limits(end, target, place)
+            end[:base] = target.rail_after(q[:base])
+            self.check_limits(end, target, place)
             return end
         pose = self.pose(target, self.tool_pose(target, q))
-        rail = self._rail_after(target, q)
-        self._check_limits(np.append(rail, q[len(rail) :]), target, place)
-        found = self._solutions(pose[None], target, rail)[0]
+        rail = self.rail_at(target, q, place)
+        found = self.configurations(pose[None], rail[None], target)[0]
         if len(found) == 0:
             raise KrlMotionError(
                 f"{_called(target)}{_spelled(pose)} is out of reach: do $BASE and $TOOL fit the "
@@ -220,22 +210,32 @@ class Arm:
         if len(fits) == 0:
             alike = found[meeting(self.scene.chain, found, target.status, None)]
             alike = alike if len(alike) else found
-            status, turn = self.status_turn(alike[np.argmin(np.abs(alike - q).max(axis=1))])
+            status, turn = self.status_turn(self.nearest(alike, q))
             raise KrlMotionError(
                 f"{_called(target)}no configuration within the limits has S {target.status}, T "
                 f"{target.turn}: the nearest one has S {status}, T {turn}, write that or teach it",
                 place,
             )
-        return np.asarray(fits[np.argmin(np.abs(fits - q).max(axis=1))])
+        return self.nearest(fits, q)
 
-    def _rail_after(self, target: Target, q: FloatArray) -> FloatArray:
-        """Where (1,) [m] the rail is at a target, from q (n,) on; (0,) without a rail."""
-        now = q[: self.scene.cell.robot.base]
-        if target.rail is None:
-            return now
-        return now + target.rail if target.relative else np.full_like(now, target.rail)
+    def nearest(self, found: FloatArray, q: FloatArray) -> FloatArray:
+        """Of configurations (m, n) with the rail at one place that whose largest turn of an axis
+        from q (n,) is the least.
+        """
+        base = self.scene.cell.robot.base
+        turns = np.abs(found - q)[:, base:].max(axis=1)
+        return np.asarray(found[np.argmin(turns)])
 
-    def _check_limits(self, q: FloatArray, target: Target, place: SourcePlace) -> None:
+    def rail_at(self, target: Target, q: FloatArray, place: SourcePlace) -> FloatArray:
+        """Where (1,) [m] the rail is at a target, from q (n,) on; (0,) without a rail. Raises
+        KrlMotionError beyond its travel.
+        """
+        rail = target.rail_after(q[: self.scene.cell.robot.base])
+        self.check_limits(np.append(rail, q[len(rail) :]), target, place)
+        return rail
+
+    def check_limits(self, q: FloatArray, target: Target, place: SourcePlace) -> None:
+        """Raise KrlMotionError where q (n,), on the way to the target, is beyond a limit."""
         robot = self.scene.cell.robot
         beyond = np.flatnonzero(
             (q < robot.position_min - _WITHIN) | (q > robot.position_max + _WITHIN)

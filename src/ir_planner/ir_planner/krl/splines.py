@@ -380,6 +380,20 @@ def _part(part: Motion, now: FloatArray, arm: Arm) -> list[FloatArray]:
     return list(poses)
 
 
+def _rails(block: SplineBlock, start: FloatArray, arm: Arm, ends: list[int]) -> FloatArray:
+    """Where (N, 1) [m] a rail is at the poses of a SPLINE, evenly within each part; without a rail
+    (N, 0). Raises KrlMotionError.
+    """
+    base = arm.scene.cell.robot.base
+    places = [start[:base]]
+    for part in block.parts:
+        q = np.append(places[-1], start[base:])
+        places.append(arm.rail_at(part.target, q, part.place))
+    at = np.arange(ends[-1] + 1)
+    columns = [np.interp(at, [0, *ends], column) for column in np.transpose(places)]
+    return np.column_stack(columns) if columns else np.zeros((len(at), 0))
+
+
 def _tool_spline(block: SplineBlock, start: FloatArray, arm: Arm) -> AxisCurve:
     """The spline of the tool through the ends of the parts, followed by the axes."""
     first = block.parts[0]
@@ -389,12 +403,17 @@ def _tool_spline(block: SplineBlock, start: FloatArray, arm: Arm) -> AxisCurve:
         raise KrlMotionError("a SPLINE goes to the same place twice in a row", block.place)
     length = float(steps.sum())
     u = np.concatenate([[0.0], np.cumsum(steps)]) / length
-    fine = np.linspace(0.0, 1.0, int(np.clip(length / _STEP_M, _SAMPLES_MIN, _SAMPLES_MAX)))
+    slid = _rails(block, start, arm, ends)
+    longest = max(length, float(np.abs(np.diff(slid, axis=0)).sum()))
+    fine = np.linspace(0.0, 1.0, int(np.clip(longest / _STEP_M, _SAMPLES_MIN, _SAMPLES_MAX)))
     along = np.tile(np.eye(4), (len(fine), 1, 1))
     places = portable.interpolating_spline(u, stacked[:, :3, 3], min(3, len(u) - 1))
     along[:, :3, 3] = places(fine)
     along[:, :3, :3] = RotationSpline(u, stacked[:, :3, :3])(fine)
-    q = followed(along, first, start, arm)
+    rails = portable.interpolating_spline(u, slid, min(3, len(u) - 1))(fine) if slid.size else slid
+    for place in (rails.min(axis=0), rails.max(axis=0)) if slid.size else ():
+        arm.check_limits(np.append(place, start[len(place) :]), first.target, block.place)
+    q = followed(along, rails, first, start, arm)
     turning = float(turn_of(portable.matmul(stacked[0, :3, :3].T, stacked[-1, :3, :3])))
     spline = portable.interpolating_spline(fine, q, _DEGREE)
     return AxisCurve(spline, length, turning, u[ends[:-1]])

@@ -126,12 +126,12 @@ def _written(
     count = max(int(np.ceil(along[-1] / _SPACING)), _FEWEST) * finer
     times = np.interp(np.linspace(0.0, along[-1], count + 1)[1:], along, stroke.times)
     times[-1] = stroke.times[-1]
-    poses = portable.matmul(
-        Arm(scene).flange(planned.sample(times).q), tool_in_flange(scene.cell.tcp)
-    )
+    q = planned.sample(times).q
+    poses = portable.matmul(Arm(scene).flange(q), tool_in_flange(scene.cell.tcp))
     acceleration = float(np.abs(np.gradient(stroke.speed, stroke.times)).max())
     comment = f"along {step.to_station}: {along[-1]:.3f} m at {stroke.top:.3g} m/s"
-    return WrittenPath(comment, poses, stroke.top, acceleration * share)
+    rails = q[:, : scene.cell.robot.base]
+    return WrittenPath(comment, poses, stroke.top, acceleration * share, rails)
 
 
 def _objection(

@@ -24,7 +24,7 @@ from ir_description import (
 from ir_description.cell import AllowedContact, Zone
 from ir_description.robot import LINK
 from ir_kernels import Chain, CollisionModel, DynamicsModel, inverse_kinematics
-from ir_kernels.ik_set import InverseKinematics
+from ir_kernels.ik_set import IkSet, InverseKinematics
 from ir_kernels.inverse_kinematics import RailIk
 from ir_kernels.power import DcBusParameters, Regeneration
 from ir_msgs_py.names import LOAD_SEPARATOR, NO_LOAD
@@ -176,6 +176,15 @@ class PlanningScene:
     def inverse_kinematics_beside(self, q: FloatArray) -> InverseKinematics:
         """The same with a rail that stays where it is at q (n,)."""
         return self.inverse_kinematics_at(q[:1])
+
+    def inverse_kinematics_along(self, poses: FloatArray, rails: FloatArray) -> IkSet:
+        """All solutions for poses (N, 4, 4) of the tcp in the world, with the rail at places (N, 1)
+        [m] of their own; (N, 0) without one.
+        """
+        everywhere = self.inverse_kinematics
+        if isinstance(everywhere, RailIk):
+            return everywhere.solve_each(poses, rails[:, 0])
+        return everywhere.solve(poses)
 
     def rail_places(self, near: FloatArray) -> FloatArray:
         """Places (P,) [m] of the rail at which a pose is sought: evenly over its travel, and where
