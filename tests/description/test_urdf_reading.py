@@ -105,7 +105,7 @@ HOSTILE = (
     ('xyz="0 0 0.4"', 'xyz="0 0 400"', "joint j1 is 400 m away: is its unit another"),
     ('axis xyz="0 0 1"', 'axis xyz="0 0 0"', "the axis of joint j1 has no length"),
     ('type="revolute"', 'type="hinge"', "joint j1 is of type 'hinge'"),
-    ('type="revolute"', 'type="prismatic"', "joint j1 is prismatic: only turning axes"),
+    ('type="revolute"', 'type="prismatic"', "on the rail j1: arms of six axes"),
     ('<child link="l1"/>', '<child link="l9"/>', "joint j1 names the link 'l9'"),
     ('<child link="l1"/>', '<child link="l2"/>', "link l2 is carried by two joints, j1 and j2"),
     ('<child link="l1"/>', "", "joint j1 has no child"),

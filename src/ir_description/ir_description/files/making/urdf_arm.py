@@ -3,6 +3,9 @@
 Fixed joints disappear: what they carry belongs to the link that carries them. So does what hangs on
 a moving joint that leads to no flange (fingers, a linkage): it stands for everywhere that this
 joint can move it. A tool frame (tool0, flange) says where the flange is and how it is turned.
+
+A sliding joint before the axes is a linear unit. It belongs to the cell file (`rail`), so that the
+arm begins with what it carries; what stands still under it is no part of the robot.
 """
 
 from __future__ import annotations
@@ -146,18 +149,20 @@ def urdf_arm(text: str, source: str, tip: str = "", without: Collection[str] = (
     Raises RobotFileError where it has not six turning axes.
     """
     read = urdf_tree(text, source)
-    path, rounding = _right_angles(_path(read, _tip(read, tip, source), source))
-    moving = _axes(path, source)
+    whole, rounding = _right_angles(_path(read, _tip(read, tip, source), source))
+    under, path = _on_rail(whole, source)
+    moving = _axes(path, source, under)
     tree = replace(read, above={**read.above, **{joint.child: joint for joint in path}})
     base = path[0].parent
-    placed = _placed(tree.path(base), path)
+    before = [] if under else tree.path(base)
+    placed = _placed(before, path)
     frames = _frames(path, moving, placed)
     planned = {joint.name for joint in (*tree.path(base), *path)}
     _check_without(without, [base, *_chain(path)], tree, source)
     gathering = _Gathering(tree, without, planned, source)
     links = []
     names = [base, *(joint.child for joint in moving)]
-    for name, group, frame in zip(names, _groups(path, tree.path(base)), frames, strict=True):
+    for name, group, frame in zip(names, _groups(path, before), frames, strict=True):
         inverse = np.linalg.inv(frame)
         links.append(gathering.link(name, group, [inverse @ placed[each] for each in group]))
     origin = np.array([b[:3, 3] - a[:3, 3] for a, b in pairwise(frames)])
@@ -170,6 +175,7 @@ def urdf_arm(text: str, source: str, tip: str = "", without: Collection[str] = (
     rounding += float((beyond + _BODY) @ np.linalg.norm(axis - np.array(turned), axis=1))
     couplings = coupling_notes(read.transmissions, [joint.name for joint in moving])
     notes = [*read.notes, *_below_base(tree.path(base)), *gathering.notes, *couplings]
+    notes += [_rail_note(joint, tree) for joint in under]
     if rounding > SAID:
         notes.append(
             "angles written with few digits are taken as right angles: that moves a point of the "
@@ -189,15 +195,61 @@ def urdf_arm(text: str, source: str, tip: str = "", without: Collection[str] = (
     )
 
 
-def _axes(path: Sequence[UrdfJoint], source: str) -> list[UrdfJoint]:
-    """The moving joints of a path; six free turning ones, else RobotFileError."""
+def _on_rail(path: Sequence[UrdfJoint], source: str) -> tuple[list[UrdfJoint], list[UrdfJoint]]:
+    """The linear unit under an arm, and the path behind it; no unit and the whole path where no
+    joint before the first axis slides. Raises RobotFileError for one that no `rail` describes.
+    """
+    first = next((k for k, joint in enumerate(path) if joint.kind in MOVING), 0)
+    sliding = [k for k, joint in enumerate(path[:first]) if joint.kind != "fixed"]
+    if len(sliding) != 1 or path[sliding[0]].kind != "prismatic":
+        return [], list(path)
+    joint = path[sliding[0]]
+    if joint.mimic or not -np.inf < joint.lower < joint.upper < np.inf:
+        raise RobotFileError(
+            source,
+            joint.line,
+            f"joint {joint.name} slides under the arm: a rail moves by itself, from one end to "
+            "another",
+        )
+    return [joint], list(path[sliding[0] + 1 :])
+
+
+def _rail_note(joint: UrdfJoint, tree: UrdfTree) -> str:
+    """What a cell file says of a linear unit, and what is left out with it."""
+    still = [
+        name
+        for name, link in tree.links.items()
+        if link.shapes and joint.name not in [each.name for each in tree.path(name)]
+    ]
+    axis = ", ".join(f"{value + 0.0:g}" for value in joint.axis)
+    speed = f", velocity: {joint.velocity:g}" if joint.velocity > 0.0 else ""
+    lacking = "acceleration" if speed else "velocity, acceleration"
+    left = (
+        f"; bodies of {listed(still)} don't ride on it and are no part of the robot: give the cell "
+        "machines for them"
+    )
+    return (
+        f"joint {joint.name} slides under the arm: write rail: {{axis: [{axis}], travel: "
+        f"[{joint.lower:g}, {joint.upper:g}]{speed}}} into the cell file, with {lacking} and "
+        "carriage_mass (what moves besides the links of the URDF), which the URDF doesn't say; the "
+        f"robot begins with link {joint.child}{left if still else ''}"
+    )
+
+
+def _axes(
+    path: Sequence[UrdfJoint], source: str, under: Sequence[UrdfJoint] = ()
+) -> list[UrdfJoint]:
+    """The moving joints of a path; six free turning ones, else RobotFileError. under: a linear
+    unit.
+    """
     moving = [joint for joint in path if joint.kind != "fixed"]
     for joint in moving:
         if joint.kind not in MOVING:
             raise RobotFileError(
                 source,
                 joint.line,
-                f"joint {joint.name} is {joint.kind}: only turning axes are planned",
+                f"joint {joint.name} is {joint.kind}: only turning axes are planned, on at most "
+                "one sliding joint under the arm",
             )
         if joint.mimic:
             raise RobotFileError(
@@ -208,10 +260,12 @@ def _axes(path: Sequence[UrdfJoint], source: str) -> list[UrdfJoint]:
             )
     if len(moving) != AXES:
         names = listed(joint.name for joint in moving)
+        rail = f" on the rail {under[0].name}" if under else ""
         raise RobotFileError(
             source,
             0,
-            f"the arm has {len(moving)} axes ({names}): arms of six axes are planned; see --tip",
+            f"the arm has {len(moving)} axes ({names}){rail}: arms of six axes are planned; "
+            "see --tip",
         )
     for joint in moving:
         if joint.kind == "revolute" and not joint.lower < joint.upper:
