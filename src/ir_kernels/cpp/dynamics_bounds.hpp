@@ -20,7 +20,7 @@ struct TorqueBounds {
 TorqueBounds torque_bounds(const Model<double>& m, const Envelope& envelope, const double* coefficients,
                            const double* durations, long S, int terms, double tolerance, long most);
 
-// Of consecutive pieces of time: their lengths [s]; the sum of the axes' powers at the DC bus is nowhere above `net` W in
+// Of consecutive pieces of time: their lengths [s]; the sum of the axes' powers at the DC link is nowhere above `net` W in
 // them, the sum of those that take power nowhere above `taken` W.
 struct PowerBounds {
   std::vector<double> seconds, net, taken;

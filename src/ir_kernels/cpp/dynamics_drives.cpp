@@ -1,4 +1,4 @@
-// The drives: power of the axes, torque that is available at a speed, and the common DC bus.
+// The drives: power of the axes, torque that is available at a speed, and the common DC link.
 #include <algorithm>
 #include <cmath>
 

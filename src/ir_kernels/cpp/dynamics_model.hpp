@@ -46,7 +46,7 @@ struct Drive {
   T rotor, viscous, coulomb, ratio, copper_at_joint;  // copper losses in W per Nm^2 of joint torque
 };
 
-// Power [W] that an axis takes from the DC bus; for numbers, their intervals and derivatives alike.
+// Power [W] that an axis takes from the DC link; for numbers, their intervals and derivatives alike.
 template <class T, class S>
 inline S axis_power(const Drive<T>& drive, const S& torque, const S& speed) {
   return torque * speed + torque * drive.copper_at_joint * torque;

@@ -1,4 +1,4 @@
-// Enclosures of the power that the axes take from the DC bus over short pieces of time.
+// Enclosures of the power that the axes take from the DC link over short pieces of time.
 #include <algorithm>
 #include <cmath>
 

@@ -1,4 +1,4 @@
-// The drives' share of the cost of a spline: torques, speeds and powers of the samples, and the energy over the DC bus.
+// The drives' share of the cost of a spline: torques, speeds and powers of the samples, and the energy over the DC link.
 #include <algorithm>
 #include <cmath>
 
@@ -107,7 +107,7 @@ double SplineCost::drives_of(double step) {  // long: value and derivative side 
   return sum(cost);
 }
 
-// Energy at the mains over the common bus, sample after sample; and the derivative by each sample's power.
+// Energy at the mains over the common DC link, sample after sample; and the derivative by each sample's power.
 double SplineCost::bus(double step) {
   const bool alone = terms_.regeneration == dynamics::Regeneration::kNone;
   power_.resize(8 * groups_.size());
@@ -132,7 +132,7 @@ double SplineCost::bus(double step) {
   return worth * energy;
 }
 
-// The bus as it is: energy, and of_power_ what a joule more in each sample costs.
+// The DC link as it is: energy, and of_power_ what a joule more in each sample costs.
 void SplineCost::exact_bus(double step) {
   const bool returns = terms_.regeneration == dynamics::Regeneration::kFedBack;
   // of_power_ first says where a joule of this sample comes from: 1 the mains (or goes back there), 2 the capacitor, 0
