@@ -44,7 +44,13 @@ from ir_planner.krl.splines import (
     tool_spline,
 )
 from ir_planner.krl.surroundings import Surroundings, nothing_around
-from ir_planner.krl.triggers import MotionPhase, along_path, instant, stages_at, stages_of
+from ir_planner.krl.triggers import (
+    MotionInstants,
+    along_path,
+    instant,
+    instants_of_motions,
+    instants_of_parts,
+)
 from ir_planner.scene import STILL, PlanningScene
 from ir_planner.timing import GRID_NS, GRID_S, standing
 from ir_values.arrays import FloatArray
@@ -268,7 +274,7 @@ class _Drive:
         through = self._through
         moves = [part.move for part in through]
         driven = trajectory(moves, self._overlaps, self.scene.cell.robot.joint_names)
-        events = self._events(driven, stages_of(moves, self._overlaps))
+        events = self._events(driven, instants_of_motions(moves, self._overlaps))
         self._through = []
         self._overlaps = []
         self._blend = None
@@ -287,11 +293,11 @@ class _Drive:
             self._set(output)
 
     def _events(
-        self, driven: JointTrajectory, stages: Sequence[Sequence[MotionPhase]]
+        self, driven: JointTrajectory, instants: Sequence[Sequence[MotionInstants]]
     ) -> list[_Event]:
         """What happens while a movement is driven."""
         events = []
-        for part, parts in zip(self._through, stages, strict=True):
+        for part, parts in zip(self._through, instants, strict=True):
             if part is not self._through[0]:
                 rounded = 0.5 * (parts[0].earliest + parts[0].free)
                 events.append(_Event(rounded, _first_part(part.command)))
@@ -302,7 +308,7 @@ class _Drive:
         self,
         driven: JointTrajectory,
         command: Motion | SplineBlock,
-        stages: Sequence[MotionPhase],
+        instants: Sequence[MotionInstants],
         triggered: Sequence[SetOutput],
     ) -> list[_Event]:
         """When the triggers of a motion act."""
@@ -312,7 +318,7 @@ class _Drive:
         events = []
         for trigger in triggered:
             assert trigger.switch is not None  # as triggers have
-            at, limited = instant(trigger.switch, stages[trigger.switch.part], shifted)
+            at, limited = instant(trigger.switch, instants[trigger.switch.part], shifted)
             events.append(_Event(at, trigger))
             if limited:
                 text = "a TRIGGER would act beyond its motion: it acts at the last place there"
@@ -415,7 +421,7 @@ class _Drive:
             self.finish()
             driven, times = timed
             self._carry(block.parts[0].payload, block.place)
-            events = self._triggers(driven, block, stages_at(times), triggered)
+            events = self._triggers(driven, block, instants_of_parts(times), triggered)
             self.here = driven.positions[-1]
             self._step(driven, (block.place,), events, moves=True)
             return
@@ -450,7 +456,7 @@ class _Drive:
         slower = [part for part in parts if part.longer > 0.0]
         names = self.scene.cell.robot.joint_names
         driven, times = stretched(trajectory([by_itself], [], names), slower, passed)
-        events = self._triggers(driven, block, stages_at(times), triggered)
+        events = self._triggers(driven, block, instants_of_parts(times), triggered)
         self.here = driven.positions[-1]
         process = (block.place,) if self.working else ()
         self._step(driven, (block.place,), events, moves=True, tool=(None,), process=process)

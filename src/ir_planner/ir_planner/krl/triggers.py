@@ -26,7 +26,7 @@ _SAME = 0.5 * GRID_S  # s
 
 
 @dataclass(frozen=True)
-class MotionPhase:
+class MotionInstants:
     """A motion of a movement, or a part of a spline, in seconds from the start of the movement:
     `free` of the corner before, the `corner` at its end begins, it `ends`; earliest, latest: how
     far a PATH leads.
@@ -60,10 +60,10 @@ Shifted = Callable[[float, float], float]
 """The instant [s] at which the tool is a distance [m] of its path after where it is at another."""
 
 
-def instant(switch: Switch, stage: MotionPhase, shifted: Shifted) -> tuple[float, bool]:
+def instant(switch: Switch, instants: MotionInstants, shifted: Shifted) -> tuple[float, bool]:
     """When a trigger acts [s], and whether that is a limit that it would lead beyond."""
-    first, last = stage.limits(switch)
-    at = stage.reference(switch)
+    first, last = instants.limits(switch)
+    at = instants.reference(switch)
     if switch.path:
         at = shifted(at, switch.path)
     at += switch.delay
@@ -71,8 +71,10 @@ def instant(switch: Switch, stage: MotionPhase, shifted: Shifted) -> tuple[float
     return acts + switch.waited, abs(acts - at) > _SAME
 
 
-def stages_of(moves: Sequence[Move], overlaps: Sequence[int]) -> list[tuple[MotionPhase, ...]]:
-    """The stages of each motion that is driven through, one for each part of a spline."""
+def instants_of_motions(
+    moves: Sequence[Move], overlaps: Sequence[int]
+) -> list[tuple[MotionInstants, ...]]:
+    """The instants of each motion that is driven through, one for each part of a spline."""
     lasting = [one.law.total for one in moves]
     begins = [0, *itertools.accumulate(a - b for a, b in zip(lasting[:-1], overlaps, strict=True))]
     before = [0, *overlaps]
@@ -84,24 +86,24 @@ def stages_of(moves: Sequence[Move], overlaps: Sequence[int]) -> list[tuple[Moti
     for k, one in enumerate(moves):
         latest = ends[k] if after[k] == 0 else corners[k + 1]
         passed = [float(begins[k] + step) for step in one.passing()]
-        found.append(_phases(passed, free[k], corners[k], begins[k], latest))
+        found.append(_instants(passed, free[k], corners[k], begins[k], latest))
     return found
 
 
-def stages_at(times: FloatArray) -> tuple[MotionPhase, ...]:
-    """The stages of a spline that passes its points at these times (parts + 1,) s."""
+def instants_of_parts(times: FloatArray) -> tuple[MotionInstants, ...]:
+    """The instants of a spline that passes its points at these times (parts + 1,) s."""
     first, *passed = times / GRID_S
-    return _phases(passed, first, passed[-1], first, passed[-1])
+    return _instants(passed, first, passed[-1], first, passed[-1])
 
 
-def _phases(
+def _instants(
     passed: Sequence[float], free: float, corner: float, earliest: float, latest: float
-) -> tuple[MotionPhase, ...]:
-    """Stages of parts that end at grid steps (parts,)."""
+) -> tuple[MotionInstants, ...]:
+    """Instants of parts that end at grid steps (parts,)."""
     starts = [free, *passed[:-1]]
     rounding = [*passed[:-1], corner]
     return tuple(
-        MotionPhase(*(GRID_S * float(one) for one in (start, corner_of, end, earliest, latest)))
+        MotionInstants(*(GRID_S * float(one) for one in (start, corner_of, end, earliest, latest)))
         for start, corner_of, end in zip(starts, rounding, passed, strict=True)
     )
 
