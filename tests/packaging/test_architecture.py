@@ -168,6 +168,43 @@ def test_ros_appears_only_in_nodes_and_parameters(package: str) -> None:
     )
 
 
+def foreign_insides(tree: ast.AST) -> Iterator[tuple[str, int]]:
+    """Private names of other objects that a file reads or sets, and what it imports of rclpy's
+    implementation.
+    """
+    own = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and not (
+            isinstance(node.value, ast.Name) and node.value.id in ("self", "cls")
+        ):
+            name = node.attr
+            if name.startswith("_") and not name.startswith("__") and name not in own:
+                yield name, node.lineno
+    for name, line in imports(tree):
+        if name.startswith("rclpy.") and (".impl" in name or "._" in name):
+            yield name, line
+
+
+def test_insides_of_rclpy_and_of_messages_are_used_in_one_file() -> None:
+    found = [
+        f"{module.relative_to(SRC)}:{line} {name}"
+        for package in sorted(PROJECT)
+        for module in modules(package)
+        if any(is_ros(name) for name, _ in imports_of(module)) and module.name != "rclpy_inside.py"
+        for name, line in foreign_insides(parsed(module))
+    ]
+    assert not found
+
+
+def test_the_walk_sees_insides() -> None:
+    source = "from rclpy.impl import x\nmessage.goal._points = made\nnode._clients[0]\nself._own"
+    assert [name for name, _ in foreign_insides(ast.parse(source))] == [
+        "_points",
+        "_clients",
+        "rclpy.impl",
+    ]
+
+
 @pytest.mark.parametrize("package", sorted(PROJECT))
 def test_pybullet_appears_in_one_file(package: str) -> None:
     backend = SRC / "ir_sim_driver" / "ir_sim_driver" / "plant" / "pybullet_backend.py"

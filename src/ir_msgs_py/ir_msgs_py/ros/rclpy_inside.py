@@ -36,6 +36,14 @@ def given_names(node: Node) -> tuple[str, ...]:
     return tuple(part(node, "_parameter_overrides") or ())
 
 
+def put(message: Any, name: str, value: Any) -> None:
+    """Set a field of a message without its checks, which look at each element of a long list; with
+    them where messages keep the field elsewhere.
+    """
+    inside = f"_{name}"
+    setattr(message, inside if hasattr(message, inside) else name, value)
+
+
 class _NeverRaisedError(Exception):
     """Stands for an exception that this rclpy does not have."""
 

@@ -25,6 +25,7 @@ from ir_msgs_py.ros.rclpy_inside import (
     converter,
     lookalike,
     part,
+    put,
 )
 from ir_msgs_py.ros.serving import RecordedActionServer
 from ir_sim_driver.motion import ErrorCode
@@ -142,7 +143,7 @@ class _CountedRequest:
                 _emptied(head)  # what is there is freed by its capacity, whatever its size
                 return convert(message)
             whole, made = _converted(convert, message, points)
-            whole.goal.trajectory._points = made
+            put(whole.goal.trajectory, "points", made)
             return whole
 
         self._kept = Convert(counted)
@@ -234,7 +235,7 @@ class TrajectoryReader:
         def parted(message: int) -> Any:
             points = _Trajectory.from_address(message).points
             whole, made = _converted(convert, message, points)
-            whole._points = made
+            put(whole, "points", made)
             return whole
 
         self._kept = Convert(parted)
