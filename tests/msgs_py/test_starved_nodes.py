@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 import random
 import re
+import select
 import signal
 import subprocess
 import sys
@@ -16,7 +17,8 @@ from pathlib import Path
 
 import pytest
 
-from ir_msgs_py.ros.testing import WaitFor
+from ir_msgs_py.ros import network
+from ir_msgs_py.ros.testing import PATIENCE, WaitFor
 
 NODES = 3  # and one that follows the killed
 STARVING = 40.0  # s
@@ -54,6 +56,48 @@ class Counting(Node):
 
 run_node("counting", Counting, sys.argv[:1])
 """
+
+
+SUSPENDED = """
+from rclpy.node import Node
+from ir_msgs_py.ros import node_process
+
+class Sleeping(Node):
+    def create_publisher(self, kind, topic, *more, **options):
+        print("publishes", topic, flush=True)
+        return super().create_publisher(kind, topic, *more, **options)
+
+node_process.LEASE = 1.5
+node_process.run_node("sleeping", lambda: Sleeping("sleeping"), [])
+"""
+
+
+def test_a_node_that_was_suspended_beyond_its_lease_says_so_and_its_name_again() -> None:
+    """Whoever forgot a participant hears the names of its nodes when its endpoints change."""
+    environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}
+    command = [sys.executable, "-c", SUSPENDED]
+    lines = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    with subprocess.Popen(command, env=environment, **lines) as node:
+        try:
+            said = ""
+            ends = time.monotonic() + PATIENCE
+            while "publishes /rosout" not in said and time.monotonic() < ends:
+                time.sleep(1.0)  # it may not have begun to look yet
+                node.send_signal(signal.SIGSTOP)
+                time.sleep(3.0)
+                node.send_signal(signal.SIGCONT)
+                while select.select([node.stdout], [], [], 2.0)[0]:
+                    said += node.stdout.readline()
+        finally:
+            node.kill()
+    assert "forgets who is silent for 1.5 s" in said
+    assert "publishes /rosout" in said
+
+
+@pytest.mark.parametrize("name", ["loopback", "fast_discovery"])
+def test_the_lease_is_that_of_the_profiles(name: str) -> None:
+    text = Path(network.profile(name)).read_text(encoding="utf-8")
+    assert re.findall(r"<leaseDuration>\s*<sec>(\d+)</sec>", text) == [f"{network.LEASE:g}"]
 
 
 @pytest.mark.long

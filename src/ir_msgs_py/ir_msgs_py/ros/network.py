@@ -31,6 +31,8 @@ BY_PROFILE = "RMW_FASTRTPS_USE_QOS_FROM_XML"
 """Lets the profile say how messages are kept: without it the middleware keeps, for every message
 that ever waited, the memory of the largest.
 """
+LEASE = 10.0
+"""s of silence after which the profiles let a participant be forgotten."""
 _SECURITY = {"ROS_SECURITY_ENABLE": "true", "ROS_SECURITY_STRATEGY": "Enforce"}
 OFF = "OFF"
 BY_PROFILE_ALONE = "SYSTEM_DEFAULT"

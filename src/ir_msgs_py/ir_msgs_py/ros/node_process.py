@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import select
 import signal
 import sys
 import threading
@@ -19,15 +20,17 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 import rclpy
+from rcl_interfaces.msg import Log
 from rclpy.executors import (
     Executor,
     SingleThreadedExecutor,
 )
+from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
-from ir_msgs_py.ros.network import apply_network
+from ir_msgs_py.ros.network import LEASE, apply_network
 from ir_msgs_py.ros.parameters import check_names, introspect_services
 from ir_msgs_py.ros.rclpy_inside import UNREADABLE_ARGUMENTS, heed_times_only, survive_clients
 from ir_msgs_py.ros.spinning import LOOK, Spinning
@@ -39,6 +42,7 @@ FAILURES_WITHIN = 60.0
 """So many callbacks may fail within so many seconds: a node that fails more often does nothing
 useful.
 """
+_PULSE = 1.0  # s between two looks whether the process was suspended
 _HELP = """usage: {name} [--ros-args [-p NAME:=VALUE ...] [--params-file FILE] [-r __ns:=/NAMESPACE]]
 
 {about}
@@ -115,7 +119,14 @@ def run_node(
         return answer
     expected: tuple[type[Exception], ...] = (InvalidValueError, *refusals)
     spinning = Spinning()
-    _on_signals(spinning.end)
+    tell: list[Callable[[], object]] = []  # the others that the node is there
+
+    def forgotten(seconds: float) -> None:
+        get_logger(name).error(_forgotten(seconds))
+        for each in tell:
+            each()
+
+    _on_signals(spinning.end, forgotten)
     try:
         apply_network()
         give_back_memory()
@@ -126,6 +137,7 @@ def run_node(
             check_names(node, words)
             spins = executor()
             spins.add_node(node)
+            tell.append(lambda: spins.create_task(lambda: _name_again(node)))
             spin(spinning, spins, node, None if goes_on is None else lambda: goes_on(node), look)
             spins.remove_node(node)
         finally:
@@ -182,16 +194,41 @@ def give_back_memory() -> None:
         choose(_M_MMAP_THRESHOLD, _LARGE)
 
 
-def _on_signals(act: Callable[[], None]) -> None:
+def _forgotten(seconds: float) -> str:
+    """What to say of a process that was suspended for so many seconds."""
+    return (
+        f"this process was suspended for {seconds:.1f} s. The middleware forgets who is silent for "
+        f"{LEASE:g} s: what was sent to this node meanwhile may be lost, and where nobody finds it "
+        "or gets its answers, start it anew"
+    )
+
+
+def _name_again(node: Node) -> None:
+    """Let the others hear the names of this participant's nodes: whoever forgot it has forgotten
+    them, and hears them only when its endpoints change. Each node may publish /rosout.
+    """
+    node.destroy_publisher(node.create_publisher(Log, "/rosout", 1))
+
+
+def _on_signals(act: Callable[[], None], forgotten: Callable[[float], None]) -> None:
     """Call `act` in a thread of its own at each SIGINT or SIGTERM, also while the main thread is in
-    C.
+    C, and `forgotten` with the seconds of a suspension that is longer than LEASE.
     """
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
 
     def listen() -> None:
-        while os.read(reading, 1):
-            act()
+        looked = time.monotonic()
+        while True:
+            came, _, _ = select.select([reading], [], [], _PULSE)
+            now = time.monotonic()
+            if now - looked > LEASE:
+                forgotten(now - looked)
+            looked = now
+            if came and not os.read(reading, 1):
+                return
+            if came:
+                act()
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _ignore)
