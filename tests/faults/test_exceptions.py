@@ -37,6 +37,15 @@ def services(driver: Any) -> DriverServices:
     return DriverServices(driver, "ir_sim_driver", lambda: None)
 
 
+def test_a_bit_that_is_refused_is_answered_with_the_levels_as_they_are(driver: Driver) -> None:
+    driver.press("service", "emergency_stop", True)
+    release = SetPlcInput.Request(name="emergency_stop", value=False)
+    waited = services(driver).set_plc_input(release, SetPlcInput.Response(), came_ns=1)
+    assert waited.status.code == StatusCode.INVALID_ROBOT_STATE
+    assert waited.inputs.emergency_stop
+    assert waited.inputs.move_enable
+
+
 @pytest.mark.parametrize(
     "error",
     [

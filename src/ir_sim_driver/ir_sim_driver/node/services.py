@@ -33,14 +33,19 @@ class DriverServices:
 
     def set_plc_input(self, request: Any, response: Any, came_ns: int = 0, client: str = "") -> Any:
         """Set one bit, or the mode switch by the name of its position; INPUT_IGNORED where it won't
-        count. came_ns: when the request came [ns of the monotonic clock]; client: who sent it.
+        count. came_ns: when the request came [ns of the monotonic clock]; client: who sent it. The
+        response has the levels as they are, also where it refuses.
         """
 
         def work() -> str:
             value = bool(request.value)
-            levels, remark = self._driver.press(
-                SERVICE, request.name, value, came_ns, client, int(request.after_stop)
-            )
+            try:
+                levels, remark = self._driver.press(
+                    SERVICE, request.name, value, came_ns, client, int(request.after_stop)
+                )
+            except RequestRefusedError:
+                response.inputs = plc_inputs_to_msg(self._driver.plc.inputs())
+                raise
             response.inputs = plc_inputs_to_msg(levels)
             if remark:
                 raise RequestRefusedError(StatusCode.INPUT_IGNORED, remark)
