@@ -492,6 +492,22 @@ def test_a_stop_in_a_program_s_rest_leaves_no_drives_off_but_the_plc_s(
     assert pair.core.start(pair.core.plc.stop.number) == (not also_plc)
 
 
+def test_bits_that_are_1_at_waking_into_a_stop_are_as_at_any_waking() -> None:
+    """drives_off counts, and stays latched when it falls; AB is ignored until it has been 0."""
+    world = STARTS["waking"]()
+    _after(world, "emergency_stop", "drives_off", "ab", "130 s", "drives_off", "21 ms")
+    pair = world.pair
+    assert pair.core.mode is Mode.EMERGENCY_STOP
+    assert pair.core.control.latches.drives_off
+    assert pair.core.plc.rest is None
+    pair.write({"emergency_stop": False})
+    pair.wait(25)
+    pair.recover()
+    pair.wait(1000)
+    assert pair.core.plc.rest is None
+    assert not pair.core.start(pair.core.plc.stop.number)
+
+
 def test_a_wish_to_leave_a_rest_is_void_after_a_stop() -> None:
     """The program has asked for open brakes before the stop: nothing asks for them after it."""
     pair = Pair()

@@ -398,7 +398,7 @@ class ModeControl:
         self.latches.mode_changed(self._plc, before, now)
         if now is Mode.EMERGENCY_STOP:
             self.pauses.wants_motors = False
-        elif before is Mode.FROM_HIBERNATION:
+        if before is Mode.FROM_HIBERNATION:
             self._plc.wake()
         if now in OFF_THE_NETWORK:
             self.pauses.forget()
