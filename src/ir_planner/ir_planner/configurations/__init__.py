@@ -14,6 +14,7 @@ from ir_planner.configurations.inverse_kinematics import (
     Configurations,
     configuration_log,
     free_configurations,
+    joined,
     no_configuration,
 )
 
@@ -27,6 +28,7 @@ __all__ = [
     "configuration_log",
     "configurations_at",
     "free_configurations",
+    "joined",
     "no_configuration",
     "searched_configurations",
 ]

@@ -6,7 +6,7 @@ obstructing pair.
 """
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,19 +40,34 @@ class Configurations:
     tracks: tuple[FloatArray, ...] = ()
     outcome: tuple[str, ...] = ()
 
+    def ordered(self, order: IntArray) -> "Configurations":
+        """The same in another order (K,)."""
+        return replace(self, q=self.q[order], branch=self.branch[order])
+
+
+def joined(first: Configurations, second: Configurations) -> Configurations:
+    """Free configurations of one pose at places of a rail, and those at other places."""
+    return replace(
+        first,
+        q=np.concatenate([first.q, second.q]),
+        branch=np.concatenate([first.branch, second.branch]),
+        reached=first.reached + second.reached,
+        rejected=first.rejected + second.rejected,
+    )
+
 
 def free_configurations(
     pose: FloatArray,
     scene: PlanningScene,
     threshold: FloatArray,
     near: FloatArray,
-    rail: float | None = None,
+    rail: float | FloatArray | None = None,
 ) -> Configurations:
     """All configurations that bring the tcp to `pose` (4, 4) with every pair above its threshold
-    (Z,); on a rail those at the place `rail` [m], None: at places over its travel and at that of
-    near (n,).
+    (Z,); on a rail those at the place `rail` [m] or at places (P,), None: at places over its travel
+    and at that of near (n,).
     """
-    places = scene.rail_places(near) if rail is None else np.array([rail])
+    places = scene.rail_places(near) if rail is None else np.atleast_1d(rail)
     found = scene.inverse_kinematics_at(places).solve(np.asarray(pose)[None])
     rejected: Counter[str] = Counter()
     if len(found.q) == 0:

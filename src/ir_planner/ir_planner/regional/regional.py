@@ -50,6 +50,7 @@ from ir_planner.regional.companions import (
 from ir_planner.regional.exploration import Path, Searches, first_paths, heeds_the_tilt
 from ir_planner.regional.in_motion import search_in_motion
 from ir_planner.regional.no_path import barrier, enclosure
+from ir_planner.regional.rail_places import configurations_over
 from ir_planner.request import Context, Goal, Journal, within_limits
 from ir_planner.scene import STILL, path_cost
 from ir_planner.search import Ends, fewest_corners, keeps_upright, pulled
@@ -330,7 +331,10 @@ def plan_to_goal(
         return plan_to_configurations(start, goal.configuration[None], context, searches)
     assert goal.pose is not None  # a Goal has one of both
     scene = context.scene
-    solutions = free_configurations(goal.pose, scene, context.thresholds(), start, goal.rail)
+    if scene.chain.first_slides and goal.rail is None:
+        solutions = configurations_over(goal.pose, start, context)
+    else:
+        solutions = free_configurations(goal.pose, scene, context.thresholds(), start, goal.rail)
     if len(solutions.q) == 0:
         status = no_configuration(goal.pose, context.scene, solutions, goal.text or "goal")
         return MovementPlan(
