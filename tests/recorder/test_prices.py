@@ -203,7 +203,7 @@ def test_the_bill_of_today_stands_beside_the_planned_one(
     page = plain(made(analysis, Costs()))
     answer = page.split('<section id="answer">')[1].partition("</section>")[0]
     result = answer.partition('<div class="do">')[0]
-    bills = dict(re.findall(r"<dt>(.*?)</dt><dd>(.*?) a year</dd>", result))
+    bills = dict(re.findall(r"<dt>(.*?)</dt><dd>(.*?) <small>a year</small></dd>", result))
     names = list(bills)
     assert names[0].startswith("common program")
     assert names[-1].startswith("planned program")

@@ -44,11 +44,11 @@ class Answer:
                 todo += f"<h2>{head}</h2>{_said(said, 'ol')}"
         if todo:
             parts.append(f'<div class="do">{todo}</div>')
-        if self.sure:
-            parts.append(f'<div class="sure"><h2>How sure</h2>{_said(self.sure, "ul")}</div>')
         if self.costs:
             costs = _said(self.costs, "ul")
             parts.append(f'<div class="costs"><h2>What energy costs</h2>{costs}</div>')
+        if self.sure:
+            parts.append(f'<div class="sure"><h2>How sure</h2>{_said(self.sure, "ul")}</div>')
         if self.counted:
             parts.append(f'<p class="counted">{self.counted}</p>')
         return f'<section id="answer">{"".join(parts)}</section>\n'
@@ -58,9 +58,16 @@ class Answer:
         if not self.bills:
             return ""
         each = "".join(
-            f"<div><dt>{text(name)}</dt><dd>{text(price)}</dd></div>" for name, price in self.bills
+            f"<div><dt>{text(name)}</dt><dd>{_amount_of(price)}</dd></div>"
+            for name, price in self.bills
         )
         return f'<dl class="bills">{each}</dl>'
+
+
+def _amount_of(price: str) -> str:
+    """An amount, and of what it is in small letters: "558 EUR", "a year"."""
+    amount, apart, of = price.partition(" a ")
+    return f"{text(amount)} <small>a {text(of)}</small>" if apart else text(price)
 
 
 def _said(words: Said, kind: str) -> str:

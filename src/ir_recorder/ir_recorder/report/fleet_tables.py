@@ -155,7 +155,8 @@ def _left(robots: Sequence[Robot], idle: IdleSaving | None, costs: Costs) -> str
         return DASH
     whole = sum_of([money for money, _ in parts])
     named = [f"{yearly_money(money.value, costs.currency)} {words}" for money, words in parts]
-    return f"{_money(whole, costs)}<small>{text(', '.join(named))}</small>"
+    each = "".join(f"<small>{text(words)}</small>" for words in named)
+    return f"{_money(whole, costs)}{each}"
 
 
 def apart_sentence(robots: Sequence[Robot]) -> str:

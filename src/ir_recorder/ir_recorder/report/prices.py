@@ -323,7 +323,8 @@ def counted_with(costs: Costs) -> str:
         f"{origin if own else 'all assumed'}"
     )
     return (
-        f'{text(words)}<a class="screen" href="#assumed">: all values, and how to give yours</a>. '
+        f'{text(words)}<span class="screen">: <a href="#assumed">all values, and how to give yours'
+        "</a></span>. "
         f"{_stands(costs)}{ROUNDED}"
     )
 

@@ -538,6 +538,8 @@ def _keyed(analysis: Analysis) -> Iterator[tuple[tuple[str, int], Share]]:
     """Energy and duration of each step, executed or planned."""
     steps = [(r.step.label, Share(r.step.label, r.seconds, r.energy)) for r in analysis.steps]
     for movement in analysis.recording.planned:
+        if movement.duration <= 0.0:  # it is where it has to go
+            continue
         label = step_label(movement)
         steps.append((label, Share(label, movement.duration, movement.report.energy)))
     times: dict[str, int] = {}

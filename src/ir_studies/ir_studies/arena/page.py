@@ -221,7 +221,7 @@ def _ranking_table(ranking: _Ranking) -> str:
     soonest = ranking.soonest
     rows = [
         (
-            f"<b>{_breakable(mine.planner)}</b><small>first</small>",
+            f"<b>{_breakable(mine.planner)}</b><small>wins</small>",
             f"<b>{mine.solved}</b> of {mine.count}",
             bar(mine.success, 1.0, "planned"),
             DASH,
