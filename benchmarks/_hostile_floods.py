@@ -207,8 +207,8 @@ def _timed(
             late.append((done if answered else numbers[-1][0]) - began)
         press(False)
         let_go = time.monotonic()
-        time.sleep(0.05)  # a flood of levels may have let it go before anybody saw it pressed
-        while pressed[-1:] == [True] and time.monotonic() - let_go < LOST:
+        # pressed again while it still is pressed it would have no number
+        while pressed[-1:] != [False] and time.monotonic() - let_go < LOST:
             time.sleep(0.005)
     return late or [LOST], lost
 
