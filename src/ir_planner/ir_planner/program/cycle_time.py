@@ -173,7 +173,7 @@ _SAME_CHAIN = 1
 
 _CUT = "no program of {:g} s found"
 _LITTLE = (
-    "no program of {:g} s found, the shortest is {:.3f} s; max_iterations ended before all was "
+    "no program of {:g} s found, the shortest is {:.3f} s{}; max_iterations ended before all was "
     "tried: more of it may help"
 )
 
@@ -262,15 +262,21 @@ def _too_short(best: "_Tried", cycle_time: float, standing: float) -> StageError
     """Why no program fits the cycle: the work ended, or nothing is as fast."""
     work = best.choice.movements.context.work
     shortest = best.values.shortest + standing
+    fixed = sum(
+        movement.trajectory.duration
+        for movement in best.values.fastest.values()
+        if movement.fixed_time
+    )
+    along = f"{fixed:.3f} s are paths of the tool at their speed" if fixed else ""
     if work.exhausted:
         return StageError(Status(StatusCode.PLANNING_FAILED, _CUT.format(cycle_time)))
     if work.left < work.improvement:  # the last movements had less than they can use
-        little = _LITTLE.format(cycle_time, shortest)
+        little = _LITTLE.format(cycle_time, shortest, f", of which {along}" if along else "")
         return StageError(Status(StatusCode.PLANNING_FAILED, little))
     return RequestError(
         StatusCode.INVALID_GOAL_CONSTRAINTS,
         f"cycle_time is {cycle_time:g} s: the shortest is {shortest:.3f} s, "
-        f"of which {standing:.3f} s are pauses",
+        f"of which {standing:.3f} s are pauses{f' and {along}' if along else ''}",
     )
 
 
