@@ -170,7 +170,7 @@ def run_path(arguments: argparse.Namespace) -> int:
     """Plan and print; exit code 1 where the path can't be driven so."""
     with sentences():
         planner = planner_of(arguments.cell, arguments.power_parameters)
-        path = _path(arguments.path, planner)
+        path = _asked_path(arguments.path, planner)
         start = None
         if arguments.start:
             start = configuration_of(
@@ -200,7 +200,7 @@ def run_path(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _path(text: str, planner: Planner) -> CartesianPath | CellPath:
+def _asked_path(text: str, planner: Planner) -> CartesianPath | CellPath:
     if is_path(text):
         return load_path(text)
     if not planner.cell.paths:

@@ -375,12 +375,15 @@ def _reachable(
         *(
             place
             for place in places[1:]
-            if all(_moved(planner, *ends, load, asked) for ends in ((home, place), (place, home)))
+            if all(
+                _movement_between(planner, *ends, load, asked)
+                for ends in ((home, place), (place, home))
+            )
         ),
     ]
 
 
-def _moved(
+def _movement_between(
     planner: Planner, start: FloatArray, goal: FloatArray, load: str, asked: ExcitationRequest
 ) -> JointTrajectory | None:
     """The certified movement between two configurations (n,), None where none is found."""
@@ -422,7 +425,7 @@ def _transfer(
     name: str,
     asked: ExcitationRequest,
 ) -> list[ProgrammeStep]:
-    trajectory = _moved(planner, start, goal, load, asked)
+    trajectory = _movement_between(planner, start, goal, load, asked)
     if trajectory is None:
         raise CommandError(
             f"the movement {name} with {load} was found with another load and is not any more"

@@ -104,7 +104,7 @@ def add_new_search(new: argparse.ArgumentParser) -> None:
 
 def run_new_search(arguments: argparse.Namespace) -> int:
     """Write the package; no file is overwritten."""
-    name = _checked(arguments.name)
+    name = _free_name(arguments.name)
     words = {
         "name": name,
         "dashed": name.replace("_", "-"),
@@ -122,7 +122,7 @@ def run_new_search(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _checked(name: str) -> str:
+def _free_name(name: str) -> str:
     """The name. InputError where it can't be one, or is taken."""
     plain = name.isascii() and name.isidentifier() and name == name.lower() and name[0] != "_"
     if not plain or keyword.iskeyword(name) or len(name) > _NAME_MAX:

@@ -134,7 +134,7 @@ def _write(
     """Write all outputs."""
     for output in arguments.output:
         if output.suffix in PICTURES:
-            sys.stderr.write(f"ir: {_written(plan, output, front=arguments.front)}\n")
+            sys.stderr.write(f"ir: {_write_result(plan, output, front=arguments.front)}\n")
     program = plan.run or plan.program
     cell = plan.run_cell or plan.cell
     if program is None or cell is None:
@@ -162,7 +162,7 @@ def _check(arguments: argparse.Namespace) -> None:
             raise InputError(f"{name} doesn't belong to --parts-per-hour: the route says it")
 
 
-def _written(plan: SteadyPlan, path: Path, *, front: bool) -> Path:
+def _write_result(plan: SteadyPlan, path: Path, *, front: bool) -> Path:
     """Write the cell with the program of the cycle, or the chart (front: of the front)."""
     try:
         if path.suffix == ".yaml":

@@ -47,12 +47,12 @@ class TimeLeft:
         if done in (self._first, of):
             return ""
         return (
-            f", about {_rounded((now - self._begun) * (of - done) / (done - self._first))} "
+            f", about {_duration_words((now - self._begun) * (of - done) / (done - self._first))} "
             "for the others"
         )
 
 
-def _rounded(seconds: float) -> str:
+def _duration_words(seconds: float) -> str:
     """A duration as people say it."""
     for unit, name in ((3600.0, "h"), (60.0, "min")):
         if seconds >= 1.5 * unit:

@@ -123,7 +123,7 @@ def _changed(cell: Cell, name: str, value: float, *, look: bool = False) -> Cell
     if what not in AXES:
         known = (CYCLE_TIME, *OPTIONS, "mass NAME", *(f"{axis} NAME" for axis in AXES))
         raise unknown_name("value", name, known)
-    return _moved(cell, thing, value * np.eye(3)[AXES.index(what)])
+    return _cell_with_moved(cell, thing, value * np.eye(3)[AXES.index(what)])
 
 
 def _with_mass(cell: Cell, name: str, mass: float, look: bool) -> Cell:
@@ -143,7 +143,7 @@ def _with_mass(cell: Cell, name: str, mass: float, look: bool) -> Cell:
     return replace(cell, parts=parts)
 
 
-def _moved(cell: Cell, name: str, by: FloatArray) -> Cell:
+def _cell_with_moved(cell: Cell, name: str, by: FloatArray) -> Cell:
     """The cell with a machine or a station moved by (3,) m in the world."""
     shift = np.eye(4)
     shift[:3, 3] = by

@@ -108,7 +108,7 @@ class Watched:
         if self.path is None:
             return ()
         found = []
-        for path in (str(self.path), *_beside(self.folder)):
+        for path in (str(self.path), *_files_for_cells(self.folder)):
             try:
                 status = os.stat(path)
             except OSError:
@@ -117,7 +117,7 @@ class Watched:
         return tuple(found)
 
 
-def _beside(folder: Path) -> Iterator[str]:
+def _files_for_cells(folder: Path) -> Iterator[str]:
     """Files that a cell in this folder may name, in a fixed order."""
     count = 0
     for root, folders, names in os.walk(folder or "."):
@@ -175,7 +175,7 @@ def save(watched: Watched | Recorded, cell: Cell, moves: Moves) -> Path:
     """
     try:
         text = edited(watched.text, cell, moves)
-        path = _written(watched, text)
+        path = _write_cell(watched, text)
         if cell_to_yaml(load_cell(path)) != cell_to_yaml(cell_with(cell, moves)):
             path.unlink()
             raise CommandError(
@@ -186,7 +186,7 @@ def save(watched: Watched | Recorded, cell: Cell, moves: Moves) -> Path:
     return path
 
 
-def _written(watched: Watched | Recorded, text: str) -> Path:
+def _write_cell(watched: Watched | Recorded, text: str) -> Path:
     for number in range(1, MOST_COPIES):
         path = watched.folder / f"{watched.stem}_moved{'' if number == 1 else f'_{number}'}.yaml"
         try:

@@ -147,7 +147,7 @@ def _from_triangles(points: FloatArray, triangles: FloatArray) -> FloatArray:
     at = np.ascontiguousarray(points.T)
     ends = ((a, b), (b, c), (c, a))
     sides = [(q - p, at - p) for p, q in ends]
-    edge = np.min([_beside(*side) for side in sides], axis=0)
+    edge = np.min([_squared_distances(*side) for side in sides], axis=0)
     normal = _cross(b - a, c - a)
     square = _dot(normal, normal)
     above = square > 0.0
@@ -160,7 +160,7 @@ def _from_triangles(points: FloatArray, triangles: FloatArray) -> FloatArray:
     return nearest
 
 
-def _beside(along: FloatArray, at: FloatArray) -> FloatArray:
+def _squared_distances(along: FloatArray, at: FloatArray) -> FloatArray:
     """Square of the distance (N,) of points at (3, N) from edges (3, N) that begin at 0."""
     square = _dot(along, along)
     share = _dot(along, at) / np.where(square == 0.0, 1.0, square)
@@ -503,10 +503,10 @@ def _widened(piece: FloatArray, margin: float) -> FloatArray:
         corners = _sorted(points[ConvexHull(points).vertices])
     except QhullError as error:
         raise InvalidValueError("one of its convex pieces is too thin") from error
-    return corners if len(corners) <= HULL_VERTICES_MAX else _rounded(corners)
+    return corners if len(corners) <= HULL_VERTICES_MAX else _with_few_faces(corners)
 
 
-def _rounded(piece: FloatArray) -> FloatArray:
+def _with_few_faces(piece: FloatArray) -> FloatArray:
     """Corners (V, 3) of a convex body with few faces around a piece (V, 3) with many: tangent to it
     where it is flattest, and all around.
     """

@@ -433,13 +433,13 @@ def _station(item: Item, machine: Equipment) -> Station:
         _search(table),
         read_tilt(table),
         _limits(table),
-        _taken(table["takes"]) if "takes" in table else (),
+        _state_names(table["takes"]) if "takes" in table else (),
         table["gives"].name() if "gives" in table else "",
         table["blend"].number(0.0, BLEND_MAX, "m") if "blend" in table else 0.0,
     )
 
 
-def _taken(item: Item) -> tuple[str, ...]:
+def _state_names(item: Item) -> tuple[str, ...]:
     """One state of a part, or several."""
     if item.is_scalar():
         return (item.name(),)

@@ -215,7 +215,7 @@ def _merged(
     low: IntArray, high: IntArray, settings: CloudSettings, notes: tuple[str, ...]
 ) -> CloudBoxes:
     """Few boxes whose union is that of the given ones, widened by the margin."""
-    joined = [_joined(low, high, axes) for axes in permutations(range(3))]
+    joined = [_joined_boxes(low, high, axes) for axes in permutations(range(3))]
     lower, upper = min(joined, key=lambda each: len(each[0]))
     if len(lower) > BOXES_MAX:
         raise InvalidValueError(
@@ -233,7 +233,9 @@ def _merged(
     )
 
 
-def _joined(low: IntArray, high: IntArray, axes: tuple[int, ...]) -> tuple[IntArray, IntArray]:
+def _joined_boxes(
+    low: IntArray, high: IntArray, axes: tuple[int, ...]
+) -> tuple[IntArray, IntArray]:
     """Boxes that touch with a whole side are joined, along one axis after the other."""
     for axis in axes:
         others = [other for other in range(3) if other != axis]

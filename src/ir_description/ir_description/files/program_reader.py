@@ -247,7 +247,7 @@ def path_from_yaml(text: str, source: str) -> CartesianPath:
     """
     root = read_items(text, source, CellFileError)
     with root.blamed():
-        return _path(root.table(("start", "segments"), _NAMES))
+        return _path_of_table(root.table(("start", "segments"), _NAMES))
 
 
 def read_paths(items: list[Item]) -> tuple[CellPath, ...]:
@@ -263,11 +263,13 @@ def read_paths(items: list[Item]) -> tuple[CellPath, ...]:
         with item.blamed():
             name = table["name"].name()
             names.add(name)
-            paths.append(CellPath(name, _path(table), machine, tuple(map(read_contact, contacts))))
+            paths.append(
+                CellPath(name, _path_of_table(table), machine, tuple(map(read_contact, contacts)))
+            )
     return tuple(paths)
 
 
-def _path(table: Table) -> CartesianPath:
+def _path_of_table(table: Table) -> CartesianPath:
     segments = tuple(_segment(item) for item in table["segments"].list(1, POSES_MAX))
     given: dict[str, Any] = {}
     for name in _NAMES:

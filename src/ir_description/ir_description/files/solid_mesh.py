@@ -70,7 +70,7 @@ def read_solid(folder: Path, name: str, suffixes: tuple[str, ...] = SUFFIXES) ->
         buffers = _buffers(path, content) if suffix == ".gltf" else {}
         triangles = _triangles_from_gltf(content, buffers, suffix)
         content += b"".join(buffers[key] for key in sorted(buffers))
-    return SolidMesh(_checked(triangles), content, error)
+    return SolidMesh(_checked_triangles(triangles), content, error)
 
 
 def triangles_from_obj(content: bytes, most: int = TRIANGLES_MAX) -> FloatArray:
@@ -165,7 +165,7 @@ class _Resolver:
     get = __getitem__
 
 
-def _checked(triangles: FloatArray) -> FloatArray:
+def _checked_triangles(triangles: FloatArray) -> FloatArray:
     check_triangles(len(triangles), READ_MAX)
     if not np.isfinite(triangles).all():
         raise InvalidValueError("the mesh has corners that are not finite")

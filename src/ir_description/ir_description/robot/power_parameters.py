@@ -50,14 +50,16 @@ def truncated_normal(
     most = (high - mean)[free] / scale
     near = np.asarray((least > -_REACH) | (most < _REACH))
     drawn = np.empty((count, len(scale)))
-    drawn[:, near] = _bounded(matrix[np.ix_(near, near)], least[near], most[near], count, generator)
+    drawn[:, near] = _draws_between(
+        matrix[np.ix_(near, near)], least[near], most[near], count, generator
+    )
     drawn[:, ~near] = _following(matrix, near, drawn[:, near], generator)
     result = np.tile(mean, (count, 1))
     result[:, free] += scale * np.clip(drawn, least, most)
     return np.asarray(np.clip(result, low, high))
 
 
-def _bounded(
+def _draws_between(
     matrix: FloatArray,
     least: FloatArray,
     most: FloatArray,

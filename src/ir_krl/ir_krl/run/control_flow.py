@@ -430,15 +430,15 @@ class Control:
         if _names(condition) & {TIMER, TIMER_FLAG}:
             seconds = self._timed(condition)
             if seconds is not None and seconds > 0.0:
-                text = f"{_written(condition)}: taken as a wait of {seconds:g} s from standstill"
+                text = f"{_text_of(condition)}: taken as a wait of {seconds:g} s from standstill"
                 self.note_at(place, text, Effect.TIMES)
                 self._wait(seconds, place)
                 return
             if seconds is None:
-                text = f"{_written(condition)}: nobody knows how long until then, taken as 0 s"
+                text = f"{_text_of(condition)}: nobody knows how long until then, taken as 0 s"
                 self.note_at(place, text, Effect.TIMES)
         self.memory.arrived()
-        self.commands.append(WaitForCondition(_written(condition), place))
+        self.commands.append(WaitForCondition(_text_of(condition), place))
         self._signals.moved()
 
     def _is_blocked(self, tree: SyntaxTree, *, wanted: bool) -> bool:
@@ -612,13 +612,13 @@ def _names(tree: SyntaxTree) -> set[str]:
     return own.union(*(_names(one) for one in tree.children if isinstance(one, SyntaxTree)))
 
 
-def _written(tree: Any) -> str:
+def _text_of(tree: Any) -> str:
     """An expression as text, for people."""
     if not isinstance(tree, SyntaxTree):
         return "" if tree is None else str(tree)
     if tree.data in ("true", "false"):
         return tree.data.upper()
-    parts = [_written(child) for child in tree.children]
+    parts = [_text_of(child) for child in tree.children]
     if tree.data == "index":
         return f"[{', '.join(parts)}]"
     if tree.data == "joined":

@@ -76,7 +76,7 @@ class Standing:
         """$POS_ACT with the base and the tool of `frames`; None where it isn't known."""
         target = self._last()
         if target is not None and _is_whole(target):
-            flange = _written(target)
+            flange = _flange_at(target)
             known = {"S": target.status, "T": target.turn}
             state: dict[str, Value] = {k: v for k, v in known.items() if v is not None}
             state |= _rail_fields(self._rail())
@@ -193,7 +193,7 @@ def _is_whole(target: Target) -> bool:
     return given is not None and not target.relative and len(given) == len(FRAME_NAMES)
 
 
-def _written(target: Target) -> FloatArray:
+def _flange_at(target: Target) -> FloatArray:
     """The flange (4, 4) [m] in the foot at a target that says all of a frame."""
     given = target.frame or {}
     xyz = [_MM * given[name] for name in FRAME_NAMES[:3]]

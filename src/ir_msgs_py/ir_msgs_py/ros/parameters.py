@@ -49,10 +49,10 @@ def answer_always(node: Node) -> None:
             service.callback, "guarded"
         ):
             service.callback = _guarded(service.callback)
-            service.srv_type = _cut(service.srv_type)
+            service.srv_type = _bounded_type(service.srv_type)
 
 
-def _cut(service_type: Any) -> Any:
+def _bounded_type(service_type: Any) -> Any:
     """The type of a service that converts no more of a request's entries than tell that they are
     too many: rclpy takes a second for ten thousand, and holds the interpreter meanwhile.
 

@@ -91,21 +91,21 @@ class Calls:
         listens by then.
         """
         stamp = self._clock.now().to_msg()
-        data = _bounded(request) if self._publisher.get_subscription_count() else None
+        data = _bounded_cdr(request) if self._publisher.get_subscription_count() else None
 
         def publish_answer(response: Any) -> None:
             if not self._publisher.get_subscription_count():
                 return
             call = RecordedCall(node=self._name, service=name, type=kind)
             call.header.stamp = stamp
-            call.request = _bounded(request) if data is None else data
-            call.response = _bounded(response)
+            call.request = _bounded_cdr(request) if data is None else data
+            call.response = _bounded_cdr(response)
             self._publisher.publish(call)
 
         return publish_answer
 
 
-def _bounded(message: Any) -> array.array[int]:
+def _bounded_cdr(message: Any) -> array.array[int]:
     """The message's CDR; nothing where it is longer than MOST_BYTES."""
     data = serialize_message(message) if _bytes_left(message, MOST_BYTES) >= 0 else b""
     return array.array("B", data if len(data) <= MOST_BYTES else b"")

@@ -37,7 +37,7 @@ def peak_interval(steps: Sequence[PlannedMovement], request: ProgramRequest) -> 
         if scene.parameters is None:
             continue
         nominal = movement_energy(step.trajectory, scene).watts.max()
-        drawn = [movement_energy(step.trajectory, one).watts.max() for one in _drawn(scene)]
+        drawn = [movement_energy(step.trajectory, one).watts.max() for one in _drawn_scenes(scene)]
         worst = np.maximum(
             worst, step.report.peak_power * np.array(drawn) / max(float(nominal), 1e-9)
         )
@@ -46,7 +46,7 @@ def peak_interval(steps: Sequence[PlannedMovement], request: ProgramRequest) -> 
     return interval(peak, worst - peak)
 
 
-def _drawn(scene: PlanningScene) -> list[PlanningScene]:
+def _drawn_scenes(scene: PlanningScene) -> list[PlanningScene]:
     """The same scene with each of the drawn robots."""
     sets = [replace(scene.parameters, mean=row) for row in drawn_robots(scene.parameters)[:ROBOTS]]
     return [
@@ -279,13 +279,15 @@ def _keyed(hops: Sequence[CostedHop]) -> Iterator[tuple[tuple[str, int], CostedH
 
 
 def _change(before: CostedHop, after: CostedHop) -> StepChange:
-    work, words = _paused(before, after) if before.is_pause else _moved(before, after)
+    work, words = (
+        _pause_change(before, after) if before.is_pause else _movement_change(before, after)
+    )
     return StepChange(
         before.title, work, words, (before.seconds, after.seconds), saving(before, after)
     )
 
 
-def _paused(before: CostedHop, after: CostedHop) -> tuple[int, str]:
+def _pause_change(before: CostedHop, after: CostedHop) -> tuple[int, str]:
     modes = [hop.steps[0].power_mode for hop in (before, after)]
     shown = [mode.replace(">", ", then ").replace("_", " ").lower() for mode in modes]
     if modes[0] == modes[1]:
@@ -295,7 +297,7 @@ def _paused(before: CostedHop, after: CostedHop) -> tuple[int, str]:
     return MODE, f"{shown[1] or 'stand on motors'} ({then}) instead of {own} ({today})"
 
 
-def _moved(before: CostedHop, after: CostedHop) -> tuple[int, str]:
+def _movement_change(before: CostedHop, after: CostedHop) -> tuple[int, str]:
     """What changed of a movement, as the kind of work that it takes and a sentence: another
     configuration, another path, other times, or other speeds on the same path.
     """
@@ -305,8 +307,8 @@ def _moved(before: CostedHop, after: CostedHop) -> tuple[int, str]:
     passed = 0 if along else len(before.steps) - len(after.steps)
     if passed > 0:
         times += f", {passed} stop{'s' if passed > 1 else ''} less on it"
-    first = _path(before)
-    second = _path(after)
+    first = _points_along(before)
+    second = _points_along(after)
     if np.abs(first[-1] - second[-1]).max() > _SAME_PATH:
         return PATH, f"another configuration at its end, {times}"
     away = _distance(second, first)
@@ -320,7 +322,7 @@ def _moved(before: CostedHop, after: CostedHop) -> tuple[int, str]:
     return TIMES, "the same path in the same time, other speeds along it"
 
 
-def _path(hop: CostedHop) -> FloatArray:
+def _points_along(hop: CostedHop) -> FloatArray:
     """Points (M, n) along all movements of a hop."""
     points = [
         step.trajectory.sample(

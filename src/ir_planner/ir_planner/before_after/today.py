@@ -52,7 +52,7 @@ def process_paths(steps: Sequence[DrivenStep], lines: Lines | None) -> tuple[Cel
     for step in (*steps, None):
         worked = () if step is None else _worked(step, lines)
         if run and not worked:
-            paths += [_path(run, names)] * len(run)
+            paths += [_cell_path(run, names)] * len(run)
             run = []
         if step is not None and worked:
             _check_alone(step, worked)
@@ -83,7 +83,7 @@ def _corners(name: str, run: Sequence[DrivenStep]) -> str:
     """What is changed at the corners of a path whose motions have different ones; "" where nothing
     is.
     """
-    corners = [1e3 * motion.corner for motion in _drawn(run)[:-1]]
+    corners = [1e3 * motion.corner for motion in _tool_motions(run)[:-1]]
     if not corners or max(corners) - min(corners) < _SAME_CORNER:
         return ""
     corner_text = "exactly" if min(corners) == 0.0 else f"with {min(corners):.3g} mm"
@@ -94,7 +94,7 @@ def _corners(name: str, run: Sequence[DrivenStep]) -> str:
     )
 
 
-def _drawn(run: Sequence[DrivenStep]) -> list[ToolMotion]:
+def _tool_motions(run: Sequence[DrivenStep]) -> list[ToolMotion]:
     return [path for step in run for path in step.tool if path is not None]
 
 
@@ -182,9 +182,9 @@ def _check_alone(step: DrivenStep, worked: tuple[SourcePlace, ...]) -> None:
     )
 
 
-def _path(run: Sequence[DrivenStep], names: set[str]) -> CellPath:
+def _cell_path(run: Sequence[DrivenStep], names: set[str]) -> CellPath:
     """The path through all motions of steps that follow each other."""
-    motions = _drawn(run)
+    motions = _tool_motions(run)
     segments = tuple(segment for motion in motions for segment in motion.segments)
     first = run[0].places[0].line
     last = run[-1].places[-1].line

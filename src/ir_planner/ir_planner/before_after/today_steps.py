@@ -88,7 +88,7 @@ def asked_program(today: Today, scene: PlanningScene) -> AskedProgram:
     if not any(step.step.kind != "PAUSE" for step in steps):
         raise nothing_moves(today.name)
     steps, notes = _at_stops(steps, today, scene)
-    steps = _carried(steps, today)
+    steps = _with_loads(steps, today)
     cell = replace(stops.cell(), program=tuple(step.step for step in steps))
     return AskedProgram(cell, tuple(steps), (*stops.notes(), *notes))
 
@@ -113,7 +113,7 @@ def _carrying(today: Today, scene: PlanningScene) -> PlanningScene:
     return replace(scene, cell=cell, loads=cell.loads())
 
 
-def _carried(steps: list[StepToday], today: Today) -> list[StepToday]:
+def _with_loads(steps: list[StepToday], today: Today) -> list[StepToday]:
     """The steps with what is carried after each, where today's program says it."""
     if not today.loads:
         return steps

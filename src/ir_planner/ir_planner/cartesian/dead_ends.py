@@ -187,7 +187,7 @@ def _divided(asked: ToolPathRequest, layers: Layers) -> Layers:
             if len(error.reached) == 0:
                 break
             open_ = np.arange(len(layers.s) - 1) == layers.layer[error.reached].max()
-        between = _between(layers.s, open_ & (np.diff(layers.s) > _FINEST))
+        between = _further_samples(layers.s, open_ & (np.diff(layers.s) > _FINEST))
         if len(between) == 0:
             break
         layers = _with(layers, between, asked)
@@ -201,7 +201,7 @@ def closer_at(asked: ToolPathRequest, layers: Layers, places: Iterable[float]) -
     for place in places:
         k = int(np.clip(np.searchsorted(layers.s, place) - 1, 0, last))
         open_[max(k - 1, 0) : k + 2] = True
-    between = _between(layers.s, open_ & (np.diff(layers.s) > _FINEST))
+    between = _further_samples(layers.s, open_ & (np.diff(layers.s) > _FINEST))
     return _with(layers, between, asked) if len(between) else layers
 
 
@@ -210,7 +210,7 @@ def _jumps(q: FloatArray, turning: BoolArray) -> BoolArray:
     return np.asarray(np.abs(difference(q[:-1], q[1:], turning)).max(axis=1) > JUMP)
 
 
-def _between(s: FloatArray, open_: BoolArray) -> FloatArray:
+def _further_samples(s: FloatArray, open_: BoolArray) -> FloatArray:
     """Further samples (B,) m in the intervals of s (N,) m that are open (N - 1,)."""
     share = np.arange(1, _PARTS) / _PARTS
     return np.asarray((s[:-1, None] + share * np.diff(s)[:, None])[open_].ravel())

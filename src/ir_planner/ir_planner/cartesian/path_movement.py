@@ -157,7 +157,7 @@ def _driven_chains(asked: ToolPathRequest, layers: Layers) -> tuple[list[DrivenP
             chains, layers = chains_through(asked, layers, _TRIED)
             notes.append(f"{len(chains)} chains")
         with journal.stage("timing") as notes:
-            driven, reasons = _driven(asked, chains)
+            driven, reasons = _first_driven(asked, chains)
             notes.append(f"{len(driven)} within the limits")
         if driven:
             return driven, layers
@@ -169,7 +169,7 @@ def _driven_chains(asked: ToolPathRequest, layers: Layers) -> tuple[list[DrivenP
     raise reasons[0]  # each chain that isn't driven gave one
 
 
-def _driven(
+def _first_driven(
     asked: ToolPathRequest, found: list[ConfigurationChain]
 ) -> tuple[list[DrivenPath], list[PathRefusedError]]:
     """The first chains that keep the speed, by longer ramps if none does with short ones, and why
@@ -304,7 +304,7 @@ def _as_slow_as_sent(path: SentPath, limits: MotionLimits, scene: PlanningScene)
             break
         counts = np.cumsum([0, *(len(tau) - 1 for tau in path.instants)])
         strokes = tuple(
-            _slower(stroke, tau, use[first:last], limits, scene)
+            _stroke_with_time(stroke, tau, use[first:last], limits, scene)
             if use[first:last].max() > 1.0
             else stroke
             for stroke, tau, first, last in zip(
@@ -315,7 +315,7 @@ def _as_slow_as_sent(path: SentPath, limits: MotionLimits, scene: PlanningScene)
     return path
 
 
-def _slower(
+def _stroke_with_time(
     stroke: TimedStroke,
     points: FloatArray,
     use: FloatArray,

@@ -128,7 +128,7 @@ def timed_stroke(
     if use_of(made.at(instants(made.law)), limits, scene).max() <= ENOUGH:
         return made
     try:
-        return _slowed(made, tolerance, limits, scene)
+        return _stroke_within_limits(made, tolerance, limits, scene)
     except PathRefusedError:
         grown = _grown(made, spans, ramps, limits, scene) if longer else None
         if grown is None:
@@ -157,7 +157,7 @@ def fitting(
             law_of(spans, ramps)
             return spans, ramps
         except TooShortError as error:
-            slower = _slower(spans, error, tolerance)
+            slower = _spans_with_lower_speed(spans, error, tolerance)
             if slower is None:
                 raise _too_short(curve, spans, ramps, error, limits, scene) from error
             spans = slower
@@ -191,7 +191,7 @@ def _grown(
     return None
 
 
-def _slower(
+def _spans_with_lower_speed(
     spans: tuple[StrokeSpan, ...], error: TooShortError, tolerance: float
 ) -> tuple[StrokeSpan, ...] | None:
     """The spans with a lower speed where one is too short for it; None where it may not be
@@ -241,7 +241,7 @@ def instants(law: SpeedLaw) -> FloatArray:
     return np.unique(np.concatenate([np.linspace(0.0, law.total, count), inner]))
 
 
-def _slowed(
+def _stroke_within_limits(
     made: TimedStroke, tolerance: float, limits: MotionLimits, scene: PlanningScene
 ) -> TimedStroke:
     """The stroke with more time where a limit is exceeded, as far as the tolerance allows."""

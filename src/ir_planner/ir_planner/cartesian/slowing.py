@@ -56,7 +56,7 @@ def unhurried(
     made = TimedStroke(curve, law_of(spans, ramps))
     tau = looked_at(made)
     need = use_of(made.at(tau), limits, scene)
-    return made if need.max() <= ENOUGH else _slowed(made, tau, need, limits, scene)
+    return made if need.max() <= ENOUGH else _stroke_with_time(made, tau, need, limits, scene)
 
 
 def slower_between(
@@ -74,10 +74,10 @@ def slower_between(
     need = np.maximum(_MORE * use[owner], 1.0)
     if made.slowness is not None:
         need = need * np.asarray(made.slowness(tau))
-    return _slowed(made, tau, need, limits, scene)
+    return _stroke_with_time(made, tau, need, limits, scene)
 
 
-def _slowed(
+def _stroke_with_time(
     made: TimedStroke,
     tau: FloatArray,
     need: FloatArray,
@@ -91,7 +91,7 @@ def _slowed(
     for _ in range(_FITS):
         need = _changing(tau, np.maximum(need, 1.0), speeds, limits)
         knots, control = _spline_of(tau, need)
-        asked = np.union1d(tau, _between(knots))
+        asked = np.union1d(tau, _instants_within(knots))
         for _ in range(_ROUNDS):
             slowness = _slowness(knots, control)
             slowed = replace(made, slowness=slowness)
@@ -152,7 +152,7 @@ def _slowness(knots: FloatArray, control: FloatArray) -> "BSpline":
     return BSpline(knots, control, _DEGREE)
 
 
-def _between(knots: FloatArray) -> FloatArray:
+def _instants_within(knots: FloatArray) -> FloatArray:
     """Instants (M,) s within the pieces of the slowness."""
     inner = np.unique(knots)
     share = np.arange(_PER_PIECE) / _PER_PIECE

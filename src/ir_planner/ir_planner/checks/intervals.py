@@ -52,7 +52,9 @@ def sampled_energy(at: Sampled, scene: PlanningScene) -> float:
     if at.span <= 0.0:
         return 0.0
     _, _, bus = _powers(at, scene)
-    return _drawn(bus, at.dt) / scene.drives.rectifier_efficiency + scene.base_watts * at.span
+    return (
+        _joules_drawn(bus, at.dt) / scene.drives.rectifier_efficiency + scene.base_watts * at.span
+    )
 
 
 def energy_and_slope(at: Sampled, scene: PlanningScene) -> tuple[float, FloatArray]:
@@ -63,11 +65,11 @@ def energy_and_slope(at: Sampled, scene: PlanningScene) -> tuple[float, FloatArr
         return 0.0, np.zeros(len(scene.parameters.names))
     torque, power, bus = _powers(at, scene)
     efficiency = scene.drives.rectifier_efficiency
-    energy = _drawn(bus, at.dt) / efficiency + scene.base_watts * at.span
+    energy = _joules_drawn(bus, at.dt) / efficiency + scene.base_watts * at.span
     price = _price(power, bus, scene) * (at.dt / efficiency)
     slope = _axis_slope(_States(at.motion, torque, price), scene)
     slope[scene.parameters.index(LINK)] = -_emptied(bus, scene) / efficiency
-    slope[scene.parameters.index("rectifier_efficiency")] = -_drawn(bus, at.dt) / (
+    slope[scene.parameters.index("rectifier_efficiency")] = -_joules_drawn(bus, at.dt) / (
         efficiency * efficiency
     )
     return energy, slope + standing_slope(at.span, scene)
@@ -81,7 +83,7 @@ def _powers(at: Sampled, scene: PlanningScene) -> tuple[FloatArray, FloatArray, 
     return torque, power, dc_bus(power, at.dt, scene.dc_bus)
 
 
-def _drawn(bus: DcBus, dt: float) -> float:
+def _joules_drawn(bus: DcBus, dt: float) -> float:
     """Joules that the DC link takes from the rectifier, less those that go back."""
     return float(bus.mains.sum()) * dt
 
@@ -170,7 +172,7 @@ def _axis_slope(at: _States, scene: PlanningScene) -> FloatArray:
     rotor = d.rotor_inertia * qdd
     balance = d.coupling.motor_torque(model.counterbalance(q))
     body = at.torque - rotor - d.viscous * qd - d.coulomb * direction + balance
-    carried = _carried(at, scene)
+    carried = _load_torque(at, scene)
     scaled = {"rotor_inertia": rotor, "counterbalance": -balance, "load_mass": carried}
     for name, torque in (*scaled.items(), ("link_mass", body - carried)):
         value = max(parameters.value(name), 1e-9)
@@ -181,7 +183,7 @@ def _axis_slope(at: _States, scene: PlanningScene) -> FloatArray:
     return slope
 
 
-def _carried(at: _States, scene: PlanningScene) -> FloatArray:
+def _load_torque(at: _States, scene: PlanningScene) -> FloatArray:
     """The part of the torque (N, n) that is due to what is attached."""
     if not scene.loads:
         return np.zeros_like(at.torque)

@@ -224,14 +224,14 @@ def clearance_violation(
     if not station or not scene.allowed(station).any():
         return _of_part(trajectory, (begin, end), plain, scene, "")
     if not isinstance(station, str):
-        return _first(_of_hop(trajectory, scene, safety_distance, station))
+        return _earliest_violation(_of_hop(trajectory, scene, safety_distance, station))
     relaxed = scene.thresholds(safety_distance, station) - PROOF_TOLERANCE
     outside = spans_outside(trajectory, scene, station, safety_distance)
     found = [
         _of_part(trajectory, (begin, end), relaxed, scene, station),
         *(_of_part(trajectory, span, plain, scene, "") for span in outside),
     ]
-    return _first(found)
+    return _earliest_violation(found)
 
 
 def _of_hop(
@@ -255,7 +255,7 @@ def _of_hop(
     return spans_of_hop
 
 
-def _first(found: Sequence[Violation | None]) -> Violation | None:
+def _earliest_violation(found: Sequence[Violation | None]) -> Violation | None:
     violations = [violation for violation in found if violation is not None]
     return min(violations, key=lambda violation: violation.time) if violations else None
 

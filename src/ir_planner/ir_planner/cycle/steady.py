@@ -312,7 +312,7 @@ def cheapest_cycle(
     once = None
     if units > 1 and problem.alike:
         once = cheapest_cycle(problem, period=period, stopped=stopped)
-    return _least(problem, units, period * units, once, stopped)
+    return _least_cycle(problem, units, period * units, once, stopped)
 
 
 def fastest_cycle(
@@ -323,10 +323,10 @@ def fastest_cycle(
     if units > 1 and problem.alike:
         once = fastest_cycle(problem, stopped=stopped)
     most = problem.longest * units if once is None else once.period * units
-    return _least(problem, units, most, once, stopped, fastest=True)
+    return _least_cycle(problem, units, most, once, stopped, fastest=True)
 
 
-def _least(
+def _least_cycle(
     problem: SteadyProblem,
     units: int,
     period: float,

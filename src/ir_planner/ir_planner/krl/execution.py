@@ -616,7 +616,7 @@ class _Drive:
         part = whole
         if piece.begin > 0.0 or at < end:
             resting = (piece.begin <= 0.0 or not whole.moves, at >= end or not whole.moves)
-            driven = _between(whole.trajectory, piece.begin, at)
+            driven = _trajectory_between(whole.trajectory, piece.begin, at)
             drawn = whole.tool if piece.begin <= 0.0 else ()
             part = replace(whole, trajectory=driven, at_rest=resting, tool=drawn)
         self.steps.append(
@@ -640,7 +640,7 @@ def _at(event: _Event) -> float:
     return event.at
 
 
-def _between(driven: JointTrajectory, begin: float, end: float) -> JointTrajectory:
+def _trajectory_between(driven: JointTrajectory, begin: float, end: float) -> JointTrajectory:
     """The part of a trajectory from one instant to another [s], which are grid steps."""
     first, last = (round(instant / GRID_S) * GRID_NS for instant in (begin, end))
     inner = driven.times_ns[(driven.times_ns > first) & (driven.times_ns < last)]

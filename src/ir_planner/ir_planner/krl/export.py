@@ -207,7 +207,7 @@ class _Job:
         """The texts of the program in the chosen style: its steps in order, with the numbers of
         tools and bases.
         """
-        carried = _carried(self._steps, self._loads)
+        carried = _loads_after(self._steps, self._loads)
         parts = [
             part
             for step, comment, load in zip(self._steps, comments, carried, strict=True)
@@ -504,7 +504,7 @@ def _held(steps: Sequence[PlannedMovement]) -> list[str]:
     return held
 
 
-def _carried(steps: Sequence[PlannedMovement], loads: Mapping[str, Payload]) -> list[int]:
+def _loads_after(steps: Sequence[PlannedMovement], loads: Mapping[str, Payload]) -> list[int]:
     """Which load is carried after each step."""
     return [list(loads).index(held) for held in _held(steps)[1:]]
 

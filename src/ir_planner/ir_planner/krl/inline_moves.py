@@ -63,11 +63,11 @@ def fitted_moves(
         line = [replace(one, velocity=_TOP) for one in _through(q[[-1]], scene, straight=True)]
         driven = _evaluated(line, step, evaluator, back)
         if not driven.reason:
-            return _slowed(driven, step, planned, evaluator, back).moves
+            return _at_planned_time(driven, step, planned, evaluator, back).moves
     for through in (True, False):
         driven = _refined(q, step, evaluator, back, style, through=through)
         if not driven.reason:
-            return _slowed(driven, step, planned, evaluator, back).moves
+            return _at_planned_time(driven, step, planned, evaluator, back).moves
         reasons.append(driven.reason)
     raise RequestError(
         StatusCode.INVALID_MOTION_PLAN,
@@ -99,11 +99,13 @@ def _refined(
         if driven.missed:
             return driven
         if driven.violation is None:
-            more = max((_between(q, *span) for span in pairwise(rows)), key=lambda one: one[1])[0]
+            more = max(
+                (_farthest_from_line(q, *span) for span in pairwise(rows)), key=lambda one: one[1]
+            )[0]
         else:
             row = int(np.abs(q - driven.violation).max(axis=1).argmin())
             k = int(np.clip(np.searchsorted(rows, row, side="right"), 1, len(rows) - 1))
-            more = _between(q, rows[k - 1], rows[k])[0]
+            more = _farthest_from_line(q, rows[k - 1], rows[k])[0]
         if more in rows:
             return driven
         rows = sorted([*rows, more])
@@ -147,7 +149,7 @@ def _missed(again: JointTrajectory, step: PlannedMovement, scene: PlanningScene)
     return ""
 
 
-def _between(q: FloatArray, first: int, last: int) -> tuple[int, float]:
+def _farthest_from_line(q: FloatArray, first: int, last: int) -> tuple[int, float]:
     """The row of q (N, n) farthest from the line between two others, and how far [rad]."""
     if last - first < 2:
         return first, 0.0
@@ -198,7 +200,7 @@ def _evaluated(
     return _Driven(moves, reason=violation.sentence, violation=at)
 
 
-def _slowed(
+def _at_planned_time(
     found: _Driven,
     step: PlannedMovement,
     planned: JointTrajectory,

@@ -41,7 +41,7 @@ def fitted_spline(step: PlannedMovement, evaluator: StepEvaluator, back: ReadBac
     found: list[tuple[float, WrittenSpline]] = []
     reason = ""
     while count <= _POINTS_MAX:
-        fits, reason = _slowed(step, planned, count, evaluator, back)
+        fits, reason = _certified_slowed(step, planned, count, evaluator, back)
         if fits is not None:
             spline, spent = fits
             longer = spline.seconds / planned.duration
@@ -60,7 +60,7 @@ def fitted_spline(step: PlannedMovement, evaluator: StepEvaluator, back: ReadBac
     )
 
 
-def _slowed(
+def _certified_slowed(
     step: PlannedMovement,
     planned: JointTrajectory,
     count: int,

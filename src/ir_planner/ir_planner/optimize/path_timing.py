@@ -376,7 +376,7 @@ def along_its_path(
     """
     path = FixedPath(given, points)
     for speed in SPEED_MARGINS if context.options.duration > 0.0 else (1.0,):
-        timed = _along(path, points, (limits, speed), effort, context)
+        timed = _spline_within_limits(path, points, (limits, speed), effort, context)
         if timed is not None:
             spline, passing, s = timed
             trajectory, exact = passing.sent(spline, given.joint_names)
@@ -384,7 +384,7 @@ def along_its_path(
     return None
 
 
-def _along(
+def _spline_within_limits(
     path: FixedPath,
     points: FloatArray,
     bounds: tuple[MotionLimits, float],

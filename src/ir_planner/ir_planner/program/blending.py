@@ -471,8 +471,8 @@ def _shortest(choice: Choice, cycle_time: float, standing: float) -> TimedChoice
             f"of which {standing:.3f} s are pauses",
         )
     factor = float(np.floor(1e6 * left / moving) / 1e6)
-    slower = {part: _slowed(movement, factor) for part, movement in found.items()}
-    joined = [replace(join, movement=_slowed(join.movement, factor)) for join in joined]
+    slower = {part: _movement_slowed(movement, factor) for part, movement in found.items()}
+    joined = [replace(join, movement=_movement_slowed(join.movement, factor)) for join in joined]
     alone = [movement for part, movement in slower.items() if part not in within]
     driven = [*(join.movement for join in joined), *alone]
     wait = cycle_time - standing - sum(one.trajectory.duration for one in driven)
@@ -481,7 +481,7 @@ def _shortest(choice: Choice, cycle_time: float, standing: float) -> TimedChoice
     return TimedChoice(choice, timed, cycle_time, joined=tuple(joined))
 
 
-def _slowed(movement: Movement, factor: float) -> Movement:
+def _movement_slowed(movement: Movement, factor: float) -> Movement:
     """The movement slower by a factor, where it may be and that is certified."""
     if movement.fixed_time:
         return movement

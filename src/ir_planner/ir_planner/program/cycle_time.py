@@ -343,10 +343,10 @@ def task_of(choice: Choice, seconds: float, standing: float) -> CycleTask:
     def spent(timed: Timed) -> float:
         return TimedChoice(choice, timed, seconds + standing).energy
 
-    return CycleTask(seconds, choice.waiting, _slower, spent)
+    return CycleTask(seconds, choice.waiting, _movement_lasting, spent)
 
 
-def _slower(movement: Movement, duration: float) -> Movement | None:
+def _movement_lasting(movement: Movement, duration: float) -> Movement | None:
     """The same movement in `duration` s, verified again; None where it isn't certified, lasts too
     long, or keeps a tool's speed.
     """

@@ -94,7 +94,7 @@ def _best(
     """The best program of synchronous, or of asynchronous movements."""
     work = context.work
     with _limited(work, work.left, min(work.improvement, _FIRST)):
-        best = _first(request, route, context, progress)
+        best = _first_program(request, route, context, progress)
     followed = request.savings or request.front_points > 0
     with _limited(work, int(_HALF * work.left) if followed else work.left, work.improvement):
         for improvement in _DEEPER:
@@ -107,7 +107,7 @@ def _best(
         return best if request.cycle_time > 0.0 else _with_better_movements(best, progress)
 
 
-def _first(
+def _first_program(
     request: ProgramRequest, route: Route, context: Context, progress: Progress
 ) -> ChainAnswer:
     """The first program. A cycle time that is too short along the cheapest chain may do along that

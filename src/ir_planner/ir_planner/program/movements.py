@@ -43,12 +43,12 @@ def slowed_near(known: Sequence[Movement], context: Context) -> Movement | None:
     """The cheapest of known movements between the same ends, each slowed down evenly as far as that
     pays; None where none is certified.
     """
-    slower = [_slowed(one, best_stretch(one.trajectory, context), context) for one in known]
+    slower = [_slowed_for(one, best_stretch(one.trajectory, context), context) for one in known]
     cheapest = sorted(slower, key=lambda movement: movement.coarse_cost)
     return next((movement for movement in cheapest if movement.prove().certified), None)
 
 
-def _slowed(one: Movement, factor: float, context: Context) -> Movement:
+def _slowed_for(one: Movement, factor: float, context: Context) -> Movement:
     """A movement slowed down for another request; what is known of it as it is stays known."""
     if factor == 1.0:
         return one.asked_by(context)
@@ -287,7 +287,7 @@ class Movements:
         """The movement of a hop between zones: past the places of its step, near a known one, or by
         a search; or why there is none.
         """
-        near = _known(self._near.across, part)
+        near = _movements_of_part(self._near.across, part)
         timed = context.planned_by(self._planner(part))
         via = self.route.at(part.hop).step.via
         if via is not None:
@@ -346,10 +346,10 @@ class Movements:
             return driven.asked_by(context.leaning_freely())
         what = f"{'entering' if entry else 'leaving'} {station}"
         at = context.at(station)
-        slower = slowed_near(_known(self._near.lines, part), at)
+        slower = slowed_near(_movements_of_part(self._near.lines, part), at)
         if slower is not None:
             return slower
-        scaling = _known((self._near.scaling,), part)
+        scaling = _movements_of_part((self._near.scaling,), part)
         try:
             movement = timed_service(
                 self.nodes(part)[0].line, entry, at, scaling[0] if scaling else None
@@ -363,6 +363,6 @@ class Movements:
         return same if same is not None and same.cost < movement.cost else movement
 
 
-def _known(those: Sequence[MovementSource | None], part: HopPart) -> list[Movement]:
+def _movements_of_part(those: Sequence[MovementSource | None], part: HopPart) -> list[Movement]:
     """The movements of a part among those that were planned."""
     return [known for one in those if one is not None and (known := one.movement(part)) is not None]

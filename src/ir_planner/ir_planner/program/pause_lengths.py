@@ -71,10 +71,10 @@ def lengths_of(
         _check(float(value), f"{name}[{k}]")
     if name == "pause_samples":
         return PauseLengths(np.sort(values), float(values.max()))
-    return _between(values)
+    return _lengths_between(values)
 
 
-def _between(quantiles: FloatArray) -> PauseLengths:
+def _lengths_between(quantiles: FloatArray) -> PauseLengths:
     """Equally likely lengths between neighbouring quantiles."""
     if len(quantiles) < 2:
         raise _refused(

@@ -70,11 +70,13 @@ def logs_of(choice: Choice, steps: Sequence[PlannedMovement]) -> Iterator[Search
             if isinstance(log, CorrectionLog) and id(log) not in exits:
                 exits.add(id(log))
                 names = movements.route.name(part.hop - 1), movements.route.name(part.hop)
-                driven = _driven(part, movements, steps)
+                driven = _tool_positions(part, movements, steps)
                 yield replace(log, start=names[0], goal=names[1], driven=driven)
 
 
-def _driven(part: HopPart, movements: Movements, steps: Sequence[PlannedMovement]) -> FloatArray:
+def _tool_positions(
+    part: HopPart, movements: Movements, steps: Sequence[PlannedMovement]
+) -> FloatArray:
     """Positions (M, 3) of the tool along the step that a part became; none where no step has its
     ends.
     """

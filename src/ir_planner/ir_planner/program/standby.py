@@ -136,7 +136,7 @@ def plan_standby(
     """
     lengths = pause if isinstance(pause, PauseLengths) else lengths_of(pause)
     rests = rests_at(q, scene, times)
-    steps, cost = _known(rests, lengths.most) if lengths.known else _policy(rests, lengths)
+    steps, cost = _sequence_for(rests, lengths.most) if lengths.known else _policy(rests, lengths)
     by_itself = rests.mean_cost((), lengths.likely)
     modes, switches = _shown(rests, steps, lengths.most)
     chosen = steps[-1].rest.name if steps else MOTORS
@@ -191,7 +191,7 @@ class _Cost(NamedTuple):
     latest: float
 
 
-def _known(rests: Rests, pause: float) -> tuple[Steps, _Cost]:
+def _sequence_for(rests: Rests, pause: float) -> tuple[Steps, _Cost]:
     """The sequence for a pause of known length [s], and its cost."""
     energy, steps = rests.known(pause)
     late = 0.0 if steps else rests.cost((), pause)[1]

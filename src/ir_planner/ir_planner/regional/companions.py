@@ -233,7 +233,7 @@ def not_worse_than_baseline(
                 continue
             better = [
                 movement
-                for movement in _along(path, context, hurried=best is None)
+                for movement in _segment_movements(path, context, hurried=best is None)
                 if (best is None or movement.coarse_cost < _WORTH_PROVING * best[1].cost)
                 and movement.prove().certified
                 and (best is None or movement.cost < best[1].cost)
@@ -254,7 +254,9 @@ def _is_excluded(segment: FloatArray, best: Movement, context: Context) -> bool:
     return best.cost < _COARSELY * baseline_costs_at_least(start, goal, context)
 
 
-def _along(segment: FloatArray, context: Context, *, hurried: bool) -> Iterator[Movement]:
+def _segment_movements(
+    segment: FloatArray, context: Context, *, hurried: bool
+) -> Iterator[Movement]:
     """The baseline along a segment (2, n), and where time is short also the fastest law that there
     is.
     """

@@ -75,7 +75,7 @@ def plan_escape(start: FloatArray, context: Context) -> EscapePlan:
     """
     context.journal.planner_id = "escape"
     context.journal.timing = "synchronous"
-    start = _standing(start, context.scene)
+    start = _start_within(start, context.scene)
     way = _Way(context, start)
     with context.journal.stage("way out") as notes:
         points = way.found()
@@ -89,7 +89,7 @@ def plan_escape(start: FloatArray, context: Context) -> EscapePlan:
         sentence = f"no way out was found on which nothing gets nearer: {way.remaining(points[-1])}"
         return EscapePlan(Status(StatusCode.PLANNING_FAILED, sentence), info, TrajectoryReport())
     try:
-        trajectory, report, wrong = _driven(points, way, context)
+        trajectory, report, wrong = _sent_steps(points, way, context)
     except TimingError as error:
         wrong = str(error)
     if wrong:
@@ -101,7 +101,7 @@ def plan_escape(start: FloatArray, context: Context) -> EscapePlan:
     return EscapePlan(Status.success(), info, report, trajectory, points, pairs, left)
 
 
-def _standing(start: FloatArray, scene: PlanningScene) -> FloatArray:
+def _start_within(start: FloatArray, scene: PlanningScene) -> FloatArray:
     """A configuration (n,) at most OUTSIDE_MAX beyond its limits. Raises RequestError."""
     robot = scene.cell.robot
     q = joint_values(start, (robot.n,), "start", StatusCode.START_STATE_INVALID)
@@ -265,7 +265,7 @@ def shortest_between(vectors: FloatArray) -> FloatArray:
     return np.asarray(point)
 
 
-def _driven(
+def _sent_steps(
     points: FloatArray, way: _Way, context: Context
 ) -> tuple[JointTrajectory, TrajectoryReport, str]:
     """The waypoints (M, n) in straight steps, as they are sent, and what isn't proved of them, "":

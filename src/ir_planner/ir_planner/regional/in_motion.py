@@ -319,7 +319,7 @@ def _stop_and_go(
 def _proved_stop(end: MovingEnd, context: Context) -> tuple[JointTrajectory | None, str]:
     """The stop of an end, one point where it rests; or None and why it isn't proved."""
     if end.at_rest:
-        return _standing(end, context), ""
+        return _trajectory_at_rest(end, context), ""
     stop = braking(end, context)
     if stop is None:
         return None, f"the {end.what} has no stop within all limits"
@@ -332,7 +332,7 @@ def _proved_stop(end: MovingEnd, context: Context) -> tuple[JointTrajectory | No
     return stop, ""
 
 
-def _standing(end: MovingEnd, context: Context) -> JointTrajectory:
+def _trajectory_at_rest(end: MovingEnd, context: Context) -> JointTrajectory:
     rest = np.zeros((1, len(end.q)))
     return JointTrajectory(context.joint_names, np.zeros(1, np.int64), end.q[None], rest, rest)
 

@@ -331,11 +331,11 @@ class Barrier:
 def barrier(ends: Ends, space: FreeSpace) -> Barrier | None:
     """What proves that no path leads from the start to any of the goals, shown for the first."""
     spread = spreads(space.scene)
-    found = [_between(ends.start, goal, space, spread) for goal in ends.goals]
+    found = [_barrier_between(ends.start, goal, space, spread) for goal in ends.goals]
     return found[0] if None not in found else None
 
 
-def _between(
+def _barrier_between(
     start: FloatArray, goal: FloatArray, space: FreeSpace, spread: FloatArray
 ) -> Barrier | None:
     """The barrier of one goal (n,) that lacks most."""
@@ -396,11 +396,16 @@ def _moved_by_joints(near: Capsule, far: Capsule, scene: PlanningScene) -> dict[
     if first >= last:
         return {}
     origin = robot.joint_origin[first]
-    before = _beside(near, origin[:3, 3], portable.matmul(origin[:3, :3], robot.joint_axis[first]))
-    return {first: 2.0 * before, last: 2.0 * _beside(far, np.zeros(3), robot.joint_axis[last])}
+    before = _distance_from_axis(
+        near, origin[:3, 3], portable.matmul(origin[:3, :3], robot.joint_axis[first])
+    )
+    return {
+        first: 2.0 * before,
+        last: 2.0 * _distance_from_axis(far, np.zeros(3), robot.joint_axis[last]),
+    }
 
 
-def _beside(capsule: Capsule, point: FloatArray, axis: FloatArray) -> float:
+def _distance_from_axis(capsule: Capsule, point: FloatArray, axis: FloatArray) -> float:
     """Distance [m] of the farther end of a capsule from an axis through a point, in the capsule's
     frame.
     """

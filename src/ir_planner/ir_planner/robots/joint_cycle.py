@@ -306,8 +306,8 @@ class _Group:
 
     def with_(self, group: _Group, around: tuple[int, int]) -> _Group:
         """The rectangle of both."""
-        one = _joined(self.one, group.one, around[0])
-        other = _joined(self.other, group.other, around[1])
+        one = _span_of_both(self.one, group.one, around[0])
+        other = _span_of_both(self.other, group.other, around[1])
         return _Group(one, other, self.first | group.first)
 
     def zone(self, robots: tuple[int, int], counts: tuple[int, int]) -> ExclusiveZone:
@@ -328,7 +328,7 @@ def _nearness(one: Span, other: Span, around: int) -> int:
     return int(ahead == one[1] or behind == other[1])
 
 
-def _joined(one: Span, other: Span, around: int) -> Span:
+def _span_of_both(one: Span, other: Span, around: int) -> Span:
     """The shortest span of two that touch."""
     spans = []
     for a, b in ((one, other), (other, one)):

@@ -147,7 +147,7 @@ class _Search:
             if reached:
                 other = there.branch(ends[int(np.flatnonzero(chosen == k)[0])])
                 own = here.branch(fresh[int(k)])
-                return _joined(own, other, turned=growing == 1)
+                return _path_of_branches(own, other, turned=growing == 1)
         return None
 
     def _targets(self, here: _Tree, there: _Tree) -> FloatArray:
@@ -214,7 +214,9 @@ class _Search:
         return np.asarray(np.sqrt((scaled * scaled).sum(axis=1)))
 
 
-def _joined(own: list[FloatArray], other: list[FloatArray], *, turned: bool) -> FloatArray:
+def _path_of_branches(
+    own: list[FloatArray], other: list[FloatArray], *, turned: bool
+) -> FloatArray:
     """One path (M, n) of two branches that end at the same configuration; turned: own is that of a
     goal.
     """

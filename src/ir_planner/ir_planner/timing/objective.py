@@ -191,14 +191,14 @@ def stretched_costs(
     )
     shape = (len(factors) * count, -1)
     axes = scene.dynamics.axis_power(speed.reshape(shape), torque.reshape(shape))
-    joules = _drawn(axes.reshape(len(factors), count, -1), factors * span / count, scene)
+    joules = _mains_joules(axes.reshape(len(factors), count, -1), factors * span / count, scene)
     options = context.options
     free = options.duration <= 0.0 and options.objective == "time_and_energy"
     per_second = options.time_value if free else 0.0
     return joules + per_second * factors * span
 
 
-def _drawn(axes: FloatArray, steps: FloatArray, scene: PlanningScene) -> FloatArray:
+def _mains_joules(axes: FloatArray, steps: FloatArray, scene: PlanningScene) -> FloatArray:
     """Joules (F,) at the mains of F motions with the powers (F, N, n) W of their axes over steps
     (F,) s.
 

@@ -255,7 +255,7 @@ def step_checks(
 
 def _from_joint_states(name: str, result: StepResult, bounds: Tolerances) -> Finding:
     """What positions say by the data of the robot, against the meter."""
-    least = _least(result, bounds)
+    least = _allowed_joules(result, bounds)
     below = max(bounds.indirect_relative * abs(result.energy), least)
     above = below
     why = _share(bounds.indirect_relative, least)
@@ -264,7 +264,7 @@ def _from_joint_states(name: str, result: StepResult, bounds: Tolerances) -> Fin
         below = max(below, 2.0 * (report.energy_high - report.energy))
         above = max(above, 2.0 * (report.energy - report.energy_low))
         why += ", twice the plan's 90 % interval, whose data these are"
-    return _between(
+    return _finding_between(
         f"energy of {name} from joint states",
         result.indirect_energy,
         result.energy - below,
@@ -282,7 +282,7 @@ def _energy(name: str, result: StepResult, bounds: Tolerances) -> Iterator[Findi
         return
     low, high, why = _expected(result, 1.0, bounds)
     why += _of_capacitors(result)
-    yield _between(
+    yield _finding_between(
         f"energy of {name}", result.energy, low - stored, high + result.lost_charge, planned, why
     )
 
@@ -294,7 +294,7 @@ def _expected(result: StepResult, share: float, bounds: Tolerances) -> tuple[flo
     data put at zero is a large part of a small robot's power at rest, as of its movements.
     """
     report = result.step.movement.report
-    least = _least(result, bounds)
+    least = _allowed_joules(result, bounds)
     planned = share * report.energy
     if bounds.within_interval and report.energy_high > report.energy_low:
         low, high = _twice(share * report.energy_low, share * report.energy_high)
@@ -337,7 +337,7 @@ def _pause(name: str, result: StepResult, bounds: Tolerances) -> Iterator[Findin
         low, high, why = _expected(result, share, bounds)
         why += " of the planned power"
     why += _of_capacitors(result)
-    yield _between(
+    yield _finding_between(
         f"energy of {name}", result.energy, low - stored, high + result.lost_charge, planned, why
     )
 
@@ -347,7 +347,7 @@ def _resting(result: StepResult, bounds: Tolerances) -> tuple[float, float, str]
     seconds = bounds.pause_duration + result.slip
     later = seconds * result.motors_power
     planned = result.step.movement.report.energy
-    least = _least(result, bounds)
+    least = _allowed_joules(result, bounds)
     low = planned - least
     high = planned + least
     why = ""
@@ -396,7 +396,7 @@ def _rests(movement: PlannedMovement) -> bool:
     return movement.power_mode not in ("", "STAND_ON_MOTORS")
 
 
-def _least(result: StepResult, bounds: Tolerances) -> float:
+def _allowed_joules(result: StepResult, bounds: Tolerances) -> float:
     """J that any step may differ by: more where a reading at an end holds more, as if the next one
     moves.
     """
@@ -421,7 +421,7 @@ def _share(relative: float, absolute: float) -> str:
     return f"{relative * 100.0:g} % or {absolute:.3g} J"
 
 
-def _between(
+def _finding_between(
     name: str, measured: float, low: float, high: float, expected: float, reason: str
 ) -> Finding:
     return Finding(name, measured, low, high, "J", reason, expected)

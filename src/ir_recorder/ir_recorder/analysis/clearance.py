@@ -52,7 +52,9 @@ def step_clearances(
     places = cell.parts_at_start()
     result: list[StepClearance | None] = []
     for step in steps:
-        result.append(None if step.movement.is_pause else _along(cell, joints, step, places))
+        result.append(
+            None if step.movement.is_pause else _step_clearance(cell, joints, step, places)
+        )
         if step.outcome == "ended":
             places = places_after(cell, places, step.movement)
     return tuple(result)
@@ -86,7 +88,7 @@ def collision_model(cell: Cell, load: str, places: PartPlaces) -> CollisionModel
     return CollisionModel(chain, capsules, bodies, pairs, cell.ignored_pairs)
 
 
-def _along(
+def _step_clearance(
     cell: Cell, joints: JointSeries, step: ExecutedStep, places: PartPlaces
 ) -> StepClearance | None:
     """The nearest pairs along a driven step; None where its positions are missing."""

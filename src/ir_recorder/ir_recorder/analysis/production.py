@@ -187,7 +187,7 @@ def drives_only(analysis: Analysis) -> bool:
 def _cycle_of(analysis: Analysis) -> Production | None:
     """The driven program's, else the planned one's; None where there is neither."""
     if analysis.program is not None:
-        return _driven(analysis, analysis.program)
+        return _driven_cycle(analysis, analysis.program)
     planned = analysis.recording.planned
     if planned_share(planned) is not None:
         return _predicted_production(analysis, planned)
@@ -223,7 +223,7 @@ def _ended(analysis: Analysis) -> str:
     return f"{ended % total or total} of {total} steps ended"
 
 
-def _driven(analysis: Analysis, program: ProgramTotals) -> Production | None:
+def _driven_cycle(analysis: Analysis, program: ProgramTotals) -> Production | None:
     """The mean cycle of what was driven; of a route that of a part, the line full."""
     steps = analysis.steps
     ended = sum(result.step.outcome == ENDED for result in steps)
@@ -470,7 +470,7 @@ def stretches(analysis: Analysis) -> list[tuple[float, float]]:
     power = analysis.recording.power
     if analysis.program is None:
         planned = [(step.duration, step.report.energy) for step in analysis.recording.planned]
-        return [*planned, *_slower(production_of(analysis))]
+        return [*planned, *_beyond_steps(production_of(analysis))]
     if power is None or len(power.time) < 2:
         return []
     span = _counted(analysis)
@@ -493,7 +493,7 @@ def stretches(analysis: Analysis) -> list[tuple[float, float]]:
     return [row for row in rows if row[0] > 0.0]
 
 
-def _slower(cycle: Production | None) -> list[tuple[float, float]]:
+def _beyond_steps(cycle: Production | None) -> list[tuple[float, float]]:
     """Seconds and joules of a plan's cycle beyond its steps: none but in another program's time."""
     if cycle is None or cycle.own is None:
         return []

@@ -48,7 +48,9 @@ def nearest(one: Analysis, other: Analysis) -> RobotDistance | None:
     high = min(first.time[-1], second.time[-1])
     times = max(first.time, second.time, key=len)
     times = times[(times >= low) & (times <= high)]
-    found = [_least(first, second, times[k : k + _ROWS]) for k in range(0, len(times), _ROWS)]
+    found = [
+        _least_distance(first, second, times[k : k + _ROWS]) for k in range(0, len(times), _ROWS)
+    ]
     return min(found, key=lambda each: each.distance, default=None)
 
 
@@ -106,7 +108,7 @@ class _Arm:
         return found
 
 
-def _least(one: _Arm, other: _Arm, times: FloatArray) -> RobotDistance:
+def _least_distance(one: _Arm, other: _Arm, times: FloatArray) -> RobotDistance:
     best = RobotDistance(np.inf, float(times[0]), ("", ""))
     others = other.segments(times)
     for name, radius, ends, there in one.segments(times):

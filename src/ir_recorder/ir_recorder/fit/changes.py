@@ -669,7 +669,7 @@ class _Tried:
         for _ in range(_INSTANTS_AGAIN):
             other = best.change
             for edge in ("start", "end") if np.isfinite(other.end) else ("start",):
-                steps = _moved(other, edge, usual)
+                steps = _at_other_instants(other, edge, usual)
                 left = [usual.with_change(each).explained(best.x).likelihood for each in steps]
                 other = steps[int(np.argmax(left))]
             if other == best.change:
@@ -681,7 +681,7 @@ class _Tried:
         return best
 
 
-def _moved(change: Change, edge: str, usual: Opened) -> list[Change]:
+def _at_other_instants(change: Change, edge: str, usual: Opened) -> list[Change]:
     """The same change at other instants: within a rest nearby, else anywhere; first as it is."""
     if np.isfinite(change.end):
         near = _NEAR * np.arange(-_STEPS, _STEPS + 1)

@@ -120,7 +120,7 @@ def _next(
     world = turn @ axis
     spin = before.spin + qd[:, None] * world
     rate = before.spin_rate + qdd[:, None] * world + np.cross(before.spin, qd[:, None] * world)
-    push = before.push + _carried(before.spin, before.spin_rate, arm)
+    push = before.push + _acceleration_at_end(before.spin, before.spin_rate, arm)
     return _Frame(turn, before.place + arm, spin, rate, push), world
 
 
@@ -133,7 +133,7 @@ def _rotations_about(axis: FloatArray, angle: FloatArray) -> FloatArray:
     return np.asarray(np.eye(3) + sin * cross + (1.0 - cos) * (cross @ cross))
 
 
-def _carried(spin: FloatArray, rate: FloatArray, arm: FloatArray) -> FloatArray:
+def _acceleration_at_end(spin: FloatArray, rate: FloatArray, arm: FloatArray) -> FloatArray:
     """Acceleration (N, 3) at the end of an arm (N, 3) that turns, relative to its foot."""
     return np.asarray(np.cross(rate, arm) + np.cross(spin, np.cross(spin, arm)))
 
@@ -152,7 +152,7 @@ def _project(
     about those that turn, the force along a rail.
     """
     arm = frame.turn @ com
-    force = mass * (frame.push + _carried(frame.spin, frame.spin_rate, arm))
+    force = mass * (frame.push + _acceleration_at_end(frame.spin, frame.spin_rate, arm))
     world = frame.turn @ inertia @ frame.turn.transpose(0, 2, 1)
     momentum = (world @ frame.spin[:, :, None])[:, :, 0]
     moment = (world @ frame.spin_rate[:, :, None])[:, :, 0] + np.cross(frame.spin, momentum)

@@ -106,7 +106,7 @@ def with_further_parts(first: RawRecording, read: Callable[[Path], RawRecording]
             problems += [f"{path.name}: {problem}" for problem in part.problems]
     return replace(
         first,
-        channels=_joined([channel for part in parts for channel in part.channels]),
+        channels=_one_per_topic([channel for part in parts for channel in part.channels]),
         attachments=tuple(attachment for part in parts for attachment in part.attachments),
         facts=tuple(dict.fromkeys(fact for part in parts for fact in part.facts)),
         problems=tuple(problems),
@@ -124,7 +124,7 @@ def _without_repeated(part: RawRecording) -> RawRecording:
     return replace(part, channels=tuple(channels))
 
 
-def _joined(channels: list[RawChannel]) -> tuple[RawChannel, ...]:
+def _one_per_topic(channels: list[RawChannel]) -> tuple[RawChannel, ...]:
     """One channel for those of a topic and a type, in the order of the files."""
     groups: dict[tuple[str, str, str], list[RawChannel]] = {}
     for channel in channels:

@@ -142,7 +142,7 @@ def read_recording(
     return _SeriesReader(read(Path(path), roots, limits), namespace).recording()
 
 
-def _taken(channel: RawChannel, rows: Sequence[int]) -> tuple[Columns, RawChannel]:
+def _columns_of(channel: RawChannel, rows: Sequence[int]) -> tuple[Columns, RawChannel]:
     """Columns of these messages of a channel."""
     messages = tuple(channel.messages[row] for row in rows)
     channel = replace(channel, messages=messages, log_time=channel.log_time[list(rows)])
@@ -264,7 +264,7 @@ class _SeriesReader:
                 f"{channel.topic}: {lost} of {len(channel.messages)} messages are empty or of "
                 f"another type than {channel.type}: left out"
             )
-            return _taken(channel, rows)
+            return _columns_of(channel, rows)
 
     def _of_one_robot(self, columns: Columns, channel: RawChannel) -> tuple[Columns, RawChannel]:
         """The joint states that name most joints; others on the topic, as a gripper's or empty
@@ -283,7 +283,7 @@ class _SeriesReader:
                 f"{channel.topic}: {len(groups[each])} messages of {joints} are left out"
             )
         rows = np.sort(np.concatenate([groups[each] for each in robot]))
-        return _taken(channel, rows.tolist())
+        return _columns_of(channel, rows.tolist())
 
     def _by_stamp(self, columns: Columns, channel: RawChannel) -> tuple[Columns, RawChannel]:
         """Messages that arrived in another order than they were made in, in that of their stamps;
@@ -297,7 +297,7 @@ class _SeriesReader:
             f"{channel.topic}: {np.count_nonzero(back)} messages arrived after later ones, by at "
             f"most {back.max() * 1e-6:.3g} ms: put into the order of their stamps"
         )
-        return _taken(channel, np.argsort(stamps, kind="stable").tolist())
+        return _columns_of(channel, np.argsort(stamps, kind="stable").tolist())
 
     def _seconds(self, stamps: IntArray) -> FloatArray:
         return np.asarray((stamps - self._start) * 1e-9, dtype=np.float64)

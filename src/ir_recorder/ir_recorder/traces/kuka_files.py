@@ -108,7 +108,7 @@ def read_kuka_trace(
 ) -> Trace:
     """The channels of a trace that are wanted; RecorderError where header and numbers disagree."""
     axes = _files_of_axes(path, len(joint_names))
-    table = _joined([_table(each) for each in axes], axes) if axes else {}
+    table = _table_of_axes([_table(each) for each in axes], axes) if axes else {}
     if not table:
         return table_trace(path, _table(path), wanted, mapping, joint_names)
     trace = table_trace(path, table, wanted, mapping, joint_names)
@@ -157,7 +157,7 @@ def _files_of_axes(path: Path, count: int) -> Sequence[Path]:
     return ()
 
 
-def _joined(
+def _table_of_axes(
     tables: Sequence[Mapping[str, FloatArray]], paths: Sequence[Path]
 ) -> dict[str, FloatArray]:
     """One table of the files of all axes, as A1, A2, ..; empty where they hold no position of one
@@ -211,7 +211,7 @@ def _values(path: Path, channel: Channel, channels: Sequence[Channel]) -> FloatA
     if kind not in _DTYPES:
         known = ", ".join(_DTYPES)
         raise RecorderError(f"{where} is of type {shown(kind)}, known are {known}")
-    raw = np.frombuffer(_content(_beside(path, channel.get(_FILE, ""), where)), np.uint8)
+    raw = np.frombuffer(_content(_file_of_numbers(path, channel.get(_FILE, ""), where)), np.uint8)
     size = np.dtype(_DTYPES[kind]).itemsize
     numbers = raw[: len(raw) // size * size].view(_DTYPES[kind])
     first = int(_number(channel, _FIRST, where, 1.0)) - 1
@@ -236,7 +236,7 @@ def _number(channel: Channel, key: str, where: str, default: float = math.nan) -
     return value
 
 
-def _beside(path: Path, name: str, where: str) -> Path:
+def _file_of_numbers(path: Path, name: str, where: str) -> Path:
     """The file of the numbers: in the header's folder, in letters of any case."""
     plain = re.split(r"[\\/]", name)[-1].lower()
     for each in sorted(path.parent.iterdir()):

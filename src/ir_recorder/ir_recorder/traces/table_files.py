@@ -82,7 +82,7 @@ def read_csv(
     """
     with _lines(path) as file:
         try:
-            return _TableReader(path, file, wanted, mapping, _cut(file), joint_names).trace()
+            return _TableReader(path, file, wanted, mapping, _is_cut_off(file), joint_names).trace()
         except csv.Error as error:
             raise RecorderError(f"{path}: {error}") from error
 
@@ -96,7 +96,7 @@ def _lines(path: Path) -> TextIO:
     )
 
 
-def _cut(file: TextIO) -> bool:
+def _is_cut_off(file: TextIO) -> bool:
     """Whether the last line lacks its end: what writes the file may have been stopped in it."""
     size = os.fstat(file.fileno()).st_size
     end = os.pread(file.fileno(), 2, max(size - 2, 0)).strip(b"\0")  # UTF-16 has two bytes for each

@@ -43,7 +43,7 @@ def check_collision(path: Path, segments: slice, offset: float, keep: Keep) -> N
         _check_point(path.start, keep)
         return
     started = time.thread_time()
-    for piece in _bounded(keep.pieces(path.coefficients[segments], path.durations[segments])):
+    for piece in _short_pieces(keep.pieces(path.coefficients[segments], path.durations[segments])):
         found = keep.scene.model.certify_trajectory(*piece)
         if found.verdict != FREE:
             at = begin + found.interval[1]
@@ -57,7 +57,7 @@ def check_collision(path: Path, segments: slice, offset: float, keep: Keep) -> N
             )
 
 
-def _bounded(pieces: Iterable[PathPiece]) -> Iterator[PathPiece]:
+def _short_pieces(pieces: Iterable[PathPiece]) -> Iterator[PathPiece]:
     """The pieces in parts of at most _PIECES segments."""
     for piece in pieces:
         for first in range(0, len(piece.durations), _PIECES):

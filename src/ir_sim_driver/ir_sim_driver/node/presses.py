@@ -289,8 +289,8 @@ class PlcTopic:
 
     def poll(self) -> int:
         """Take what has come; the number of messages."""
-        heard = list(_taken(self._presses))
-        came = list(_taken(self._all))
+        heard = list(_waiting_presses(self._presses))
+        came = list(_waiting_presses(self._all))
         if came:
             self._write_all(came)
         ahead = self._order.presses(heard)
@@ -342,7 +342,7 @@ class PlcTopic:
             self._driver.warn(f"plc_inputs ignored: {error}")
 
 
-def _taken(subscriptions: Sequence[tuple[Any, bool]]) -> Iterator[ReceivedPress]:
+def _waiting_presses(subscriptions: Sequence[tuple[Any, bool]]) -> Iterator[ReceivedPress]:
     """What waits, at most a turn of each."""
     ahead = time.time_ns() - time.monotonic_ns()
     for subscription, latching in subscriptions:

@@ -68,10 +68,10 @@ def cell_picture(cell: Cell, q: FloatArray) -> str:
         for capsule in capsules:
             pose = links[capsule.link]
             solids.append((kind, capsule_mesh(capsule).points @ pose[:3, :3].T + pose[:3, 3]))
-    return _drawn(cell.name, solids)
+    return _polygons(cell.name, solids)
 
 
-def _drawn(name: str, solids: list[tuple[str, FloatArray]]) -> str:
+def _polygons(name: str, solids: list[tuple[str, FloatArray]]) -> str:
     """Solids (V, 3) m from far to near, as polygons."""
     right, up, near = _view()
     flat = [

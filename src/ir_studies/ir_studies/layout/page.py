@@ -629,7 +629,7 @@ def _places(finals: Sequence[Sequence[Final]]) -> str:
     one.
     """
     others = [own[0] for own in finals if not own[0].is_given and own[0].solved]
-    moved = [_moved(one) for one in others]
+    moved = [_displacements(one) for one in others]
     owners = list(dict.fromkeys(owner for own in moved for owner in own))
     if not owners:
         return ""
@@ -641,7 +641,7 @@ def _places(finals: Sequence[Sequence[Final]]) -> str:
     return table(heads, rows, "What stands how far from where it is given")
 
 
-def _moved(one: Final) -> dict[str, str]:
+def _displacements(one: Final) -> dict[str, str]:
     """What stands how far from where it is given, by owner."""
     by: dict[str, list[str]] = {}
     for name, value in sorted(one.placement.values.items()):

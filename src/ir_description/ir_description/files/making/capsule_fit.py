@@ -53,7 +53,7 @@ def fitted(
 
     axis (3,): a direction that is tried beside the principal ones, as from one joint to the next.
     """
-    fine = _cut(triangles)
+    fine = _without_long_triangles(triangles)
     few = fine[:: max(1, len(fine) // _FEW)]
     rough = _Rough(few, axis)
     nearest = cKDTree(few.mean(axis=1)).query(fine.mean(axis=1))[1]
@@ -171,7 +171,7 @@ class _Rough:
                     yield self.part(below), self.part(above)
 
 
-def _cut(triangles: FloatArray) -> FloatArray:
+def _without_long_triangles(triangles: FloatArray) -> FloatArray:
     """The same surface without long triangles."""
     points = triangles.reshape(-1, 3)
     longest = _EDGE * float(np.linalg.norm(np.ptp(points, axis=0)))
@@ -190,7 +190,7 @@ class _Surface:
     def __init__(self, triangles: FloatArray) -> None:
         normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         flat = np.linalg.norm(normal, axis=1) > 0.0
-        self._triangles = _cut(triangles[flat])
+        self._triangles = _without_long_triangles(triangles[flat])
         self._tree = cKDTree(self._triangles.mean(axis=1))
 
     def distance(self, points: FloatArray) -> FloatArray:
@@ -328,7 +328,7 @@ def _best(
     ball = np.sqrt(_square(outermost - middle[:, None]).max(axis=1))
     radius = np.where(low > high, ball, np.sqrt(square[:, 0]))
     line = int(np.argmin(_volume(np.maximum(high - low, 0.0), radius)))
-    return _along(points, centre[line], directions[line])
+    return _capsule_along(points, centre[line], directions[line])
 
 
 def _square(vectors: FloatArray) -> FloatArray:
@@ -336,7 +336,7 @@ def _square(vectors: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("...i,...i->...", vectors, vectors))
 
 
-def _along(points: FloatArray, centre: FloatArray, direction: FloatArray) -> CapsuleFit:
+def _capsule_along(points: FloatArray, centre: FloatArray, direction: FloatArray) -> CapsuleFit:
     """The capsule around a line, caps pulled in; where it is shorter than these, a sphere around
     the middle.
     """

@@ -149,7 +149,7 @@ def urdf_arm(text: str, source: str, tip: str = "", without: Collection[str] = (
     Raises RobotFileError where it has not six turning axes.
     """
     read = urdf_tree(text, source)
-    whole, rounding = _right_angles(_path(read, _tip(read, tip, source), source))
+    whole, rounding = _right_angles(_joints_to(read, _tip(read, tip, source), source))
     under, path = _on_rail(whole, source)
     moving = _axes(path, source, under)
     tree = replace(read, above={**read.above, **{joint.child: joint for joint in path}})
@@ -333,7 +333,7 @@ def _followers(tree: UrdfTree, name: str) -> int:
     return sum(bool(joint.mimic) for joint in tree.path(name))
 
 
-def _path(tree: UrdfTree, tip: str, source: str) -> list[UrdfJoint]:
+def _joints_to(tree: UrdfTree, tip: str, source: str) -> list[UrdfJoint]:
     """The joints from the base to a link; a first link called world is not the base."""
     path = tree.path(tip)
     if path and path[0].kind == "fixed" and path[0].parent == "world":
@@ -450,11 +450,11 @@ class _Gathering:
         4) in the planned link.
         """
         parts = [
-            _moved(part, pose)
+            _part_in_frame(part, pose)
             for each, pose in zip(names, poses, strict=True)
             for part in self._carried(each)
         ]
-        return replace(_joined(name, parts), line=self._tree.links[name].line)
+        return replace(_one_link(name, parts), line=self._tree.links[name].line)
 
     def _carried(self, name: str) -> Iterator[_Part]:
         """A link, and what it carries beside the path, in its frame."""
@@ -469,7 +469,7 @@ class _Gathering:
                 continue
             found = list(self._carried(joint.child))
             if joint.kind == "fixed":
-                yield from (_moved(part, joint.pose) for part in found)
+                yield from (_part_in_frame(part, joint.pose) for part in found)
             else:
                 motion = self._motion(joint)
                 self._say(joint, motion, sum(len(shapes) for _, shapes in found))
@@ -525,7 +525,7 @@ class _Gathering:
                 yield from self._below(joint.child)
 
 
-def _moved(part: _Part, pose: FloatArray) -> _Part:
+def _part_in_frame(part: _Part, pose: FloatArray) -> _Part:
     """A part re-expressed by the pose (4, 4) of its frame."""
     link, shapes = part
     R = pose[:3, :3]
@@ -536,12 +536,12 @@ def _moved(part: _Part, pose: FloatArray) -> _Part:
 def _moving(part: _Part, motion: SideMotion) -> _Part:
     """A part that a joint beside the path moves, in the link that carries the joint."""
     middle = motion.at(0.5 * (motion.lower + motion.upper))
-    own, _ = _moved(part, middle)
+    own, _ = _part_in_frame(part, middle)
     _, shapes = part
     return own, tuple(replace(shape, motions=(*shape.motions, motion)) for shape in shapes)
 
 
-def _joined(name: str, parts: Sequence[tuple[UrdfLink, tuple[PlacedShape, ...]]]) -> ArmLink:
+def _one_link(name: str, parts: Sequence[tuple[UrdfLink, tuple[PlacedShape, ...]]]) -> ArmLink:
     """Mass, centre and inertia of several links as of one."""
     shapes = tuple(shape for _, own in parts for shape in own)
     mass = sum(part.mass for part, _ in parts)

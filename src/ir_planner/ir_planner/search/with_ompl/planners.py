@@ -52,13 +52,13 @@ def found_by(
         )
     if outcome.path is None:
         return Found([], outcome.error or f"OMPL found no path in {outcome.edges} checks")
-    path = repaired(_between(outcome.path, ends), space, seed)
+    path = repaired(_path_with_ends(outcome.path, ends), space, seed)
     return Found(
         [path] if path is not None else [], "OMPL's path is blocked and could not be repaired"
     )
 
 
-def _between(path: FloatArray, ends: Ends) -> FloatArray:
+def _path_with_ends(path: FloatArray, ends: Ends) -> FloatArray:
     """The path (M, n) with the ends that were asked for, bit by bit, and without steps that don't
     move.
     """
