@@ -36,9 +36,11 @@ ROBOTS = {
 }
 """Robots with their payloads [kg]."""
 CLEAN = "nothing"
-KINDS = (CLEAN, "payload", "watts", "rest", "clock", "friction")
+WARM = "friction"
+KINDS = (CLEAN, "payload", "watts", "rest", "clock", WARM)
 NAMED = {"payload": "payload", "watts": "watts", "rest": "watts", "clock": "clock"}
 SECONDS = 20.0
+LONG = 60.0  # s: of recordings in which gears get warm
 NEAR = 4.0  # s beside the instant: a change is seen by the movements before and behind it
 _REST = 2.0  # s before and after
 _LEAST_LEFT = 1.0  # s of a rest
@@ -80,7 +82,7 @@ def recorded(name: str, kind: str, seed: int, seconds: float = SECONDS) -> Phase
         time = DT * np.arange(len(q))
         end = float(time[first + longer])
     torque = torques(robot, time, q, qd, qdd)
-    if kind == "friction":
+    if kind == WARM:
         size = rng.uniform(0.4, 1.0)
         colder = size * np.exp(-time / (rng.uniform(0.3, 0.7) * seconds))
         torque = torque + robot.viscous * colder[:, None] * qd
@@ -123,7 +125,7 @@ def outcome(phases: Phases, found: Change | None) -> str:
         return "named without need"
     kinds = {found.kind, *found.others}
     wanted = NAMED.get(phases.kind, phases.kind)
-    near = abs(found.start - phases.start) < NEAR or phases.kind == "friction"
+    near = abs(found.start - phases.start) < NEAR or phases.kind == WARM
     return "named rightly" if wanted in kinds and near else "named wrongly"
 
 
@@ -131,12 +133,14 @@ def outcomes(seeds: range, robots: Sequence[str] = tuple(ROBOTS)) -> Iterator[di
     """What comes of recordings of robots and of every kind, as rows."""
     for seed in seeds:
         for name in robots:
-            for kind in KINDS:
-                phases = recorded(name, kind, seed)
+            lasts = [(kind, SECONDS) for kind in KINDS[:-1]] + [(CLEAN, LONG), (WARM, LONG)]
+            for kind, seconds in lasts:
+                phases = recorded(name, kind, seed, seconds)
                 found = change(estimate_of(phases))
                 yield {
                     "robot": name,
                     "changed": kind,
+                    "seconds": seconds,
                     "at": round(phases.start, 1),
                     "by": round(phases.size, 2),
                     "outcome": outcome(phases, found),

@@ -6,9 +6,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from _measured_phases import CLEAN, ROBOTS, estimate_of, outcome, recorded, torque_log
+from _measured_phases import CLEAN, LONG, ROBOTS, WARM, estimate_of, outcome, recorded, torque_log
 
 from ir_recorder.fit import Change, change, doubts, left_out, recommendation
+from ir_recorder.fit.changes import opened, shuffled, warming
 
 
 @pytest.mark.parametrize("name", ["ur10e", pytest.param("kr300_r2700_2", marks=pytest.mark.long)])
@@ -75,6 +76,32 @@ def test_a_sentence_has_run_time_and_size(kind: str, size: float, words: str) ->
     said = Change("run_2", kind, 12.34, size=size).sentence
     assert said.startswith("run_2: from about 12.3 s on ")
     assert words in said
+
+
+def test_gears_that_get_warm_are_named_with_about_their_friction_at_the_begin() -> None:
+    phases = recorded("ur10e", WARM, 22, LONG)
+    estimate = estimate_of(phases)
+    usual = opened(estimate)
+    found = warming(usual, usual.fitted(usual.with_more(estimate.found)))
+    assert found is not None
+    assert outcome(phases, found) == "named rightly"
+    assert 0.25 < found.size < 1.5  # of 0.4 to 1.0: its own friction is hidden in that of the axes
+    assert "friction fell while it was recorded" in found.sentence
+
+
+def test_gears_that_stay_as_they_are_are_not_called_warm() -> None:
+    estimate = estimate_of(recorded("ur10e", CLEAN, 20, LONG))
+    usual = opened(estimate)
+    assert warming(usual, usual.fitted(usual.with_more(estimate.found))) is None
+
+
+def test_movements_are_shuffled_and_rests_are_not() -> None:
+    fades = np.array([1.0, 0.8, 0.6, 0.4, 0.2])
+    moves = np.array([True, False, True, True, False])
+    orders = shuffled(fades, moves)
+    assert (orders[:, ~moves] == fades[~moves]).all()
+    assert (np.sort(orders[:, moves]) == np.sort(fades[moves])).all()
+    assert len(np.unique(orders, axis=0)) == 6
 
 
 def test_the_shape_of_a_change_ends_and_fades() -> None:

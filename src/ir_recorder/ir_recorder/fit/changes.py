@@ -19,7 +19,8 @@ from ir_description import Load
 from ir_recorder.fit.channels import FRICTION, WINDOW, FittedRun, by_window
 from ir_recorder.fit.power_estimate import Estimate, rests, safe
 from ir_recorder.measure.power_model import PowerModel, Prepared
-from ir_values.arrays import FloatArray, IntArray
+from ir_recorder.measure.samples import MOVING
+from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 # Kinds of changes, and how each enters the prediction.
 
@@ -99,8 +100,8 @@ class Change:
         if np.isfinite(self.fading):
             return (
                 f"{self.run}: friction fell while it was recorded, at its begin viscous friction "
-                f"was {100.0 * self.size:+.0f} %, which fades in {self.fading:.0f} s: gears that "
-                "got warm? Warm up before you record, and fit warm and cold robots apart"
+                f"was about {100.0 * self.size:+.0f} %, which fades in some {self.fading:.0f} s: "
+                "gears that got warm? Warm up before you record, and fit warm and cold robots apart"
             )
         or_else = "".join(f", or {_NAMES[each]}" for each in self.others)
         return f"{self.run}: from about {self.start:.1f} s on {what}{or_else}: {advice}"
@@ -455,6 +456,37 @@ _FIRST = 0.02  # of the squares: to first order, at least
 _SEEN = 1e-3  # of a change: what is left beside all other parameters, at least
 
 
+@dataclass(frozen=True, eq=False)
+class _FirstOrder:
+    """The fit about parameters x: weight (R,) of its rows, slopes (R, ..), an orthonormal basis
+    (R + F, F) of what the parameters that are free explain of rows and pulls, and what is left of
+    both (R + F,).
+    """
+
+    usual: Opened
+    x: FloatArray
+    weight: FloatArray
+    slopes: FloatArray
+    basis: FloatArray
+    left: FloatArray
+
+    @classmethod
+    def of(cls, usual: Opened, x: FloatArray) -> _FirstOrder:
+        """About x (P + E + ..,)."""
+        missing, slopes = usual.rows(x)
+        weight = usual.weights(x)
+        free = usual.wide > 0.0
+        own = weight[:, None] * slopes[:, free] * usual.wide[free]
+        basis = np.linalg.qr(np.vstack([own, np.eye(own.shape[1])]))[0]
+        pulled = ((usual.before - x) / safe(usual.wide))[free]
+        target = np.concatenate([weight * missing, pulled])
+        return cls(usual, x, weight, slopes, basis, target - basis @ (basis.T @ target))
+
+    def along(self, kind: str) -> FloatArray:
+        """How the weighted rows (R,) change with a change of a kind that holds all the time."""
+        return np.asarray(self.weight * self.usual.slope_of(kind, self.x, self.slopes))
+
+
 def _candidates(kind: str, usual: Opened) -> Iterator[Change]:
     for number, run in enumerate(usual.estimate.runs):
         time = run.samples.time
@@ -489,16 +521,9 @@ def _likeliest(kind: str, usual: Opened, x: FloatArray) -> list[Change]:
     """The changes of a kind that explain most to first order: of a payload, which first order tells
     least well, the best of each part of the recordings; none where that is little.
     """
-    missing, slopes = usual.rows(x)
-    weight = usual.weights(x)
-    free = usual.wide > 0.0
-    own = weight[:, None] * slopes[:, free] * usual.wide[free]
-    basis = np.linalg.qr(np.vstack([own, np.eye(own.shape[1])]))[0]
-    pulled = ((usual.before - x) / safe(usual.wide))[free]
-    target = np.concatenate([weight * missing, pulled])
-    left = target - basis @ (basis.T @ target)
-    rows = len(missing)
-    along = weight * usual.slope_of(kind, x, slopes)
+    about = _FirstOrder.of(usual, x)
+    rows = len(about.weight)
+    along = about.along(kind)
     places, times = usual.times()
     least = _FIRST * rows
     best: dict[int, tuple[float, Change]] = {}
@@ -509,10 +534,10 @@ def _likeliest(kind: str, usual: Opened, x: FloatArray) -> list[Change]:
         column = np.zeros(rows)
         column[inside] = (along * each.shape(times))[inside]
         size = float(column @ column)
-        alone = size - float(np.square(basis[:rows].T @ column).sum())
+        alone = size - float(np.square(about.basis[:rows].T @ column).sum())
         if not alone > _SEEN * size:
             continue
-        projected = float(column @ left[:rows])
+        projected = float(column @ about.left[:rows])
         part = k * parts // len(candidates)
         if projected**2 / alone > best.get(part, (least, each))[0]:
             best[part] = projected**2 / alone, replace(each, size=projected / alone)
@@ -585,6 +610,100 @@ def _left(sums: FloatArray) -> FloatArray:
     return np.asarray(yy - y**2 / count - slope**2 / np.maximum(xx - x**2 / count, 1e-9))
 
 
+# Gears that get warm while it is recorded.
+#
+# Axes that move one after the other hide friction that fades by degrees: each has its own, and to
+# first order a hundredth of the change is left beside all other parameters. What the model lacks
+# leaves as much in some movement or other, but it does not know which came first. So the movements
+# are shuffled: of friction that fades in their own order more is seen than in nearly all others.
+
+_FADING = 0.6  # of a recording: seconds after which the change is down to 1 / e
+_SHUFFLED = 500  # times
+_AT_ONCE = 50  # of them
+_SELDOM = 0.02  # of the shuffled orders show as much, at most: so many false alarms
+_ENOUGH = 40.0  # of the squares, in units of the noise
+_WARMED = (
+    0.25,
+    1.5,
+)  # of viscous friction: less is not told from what the model lacks, nor is more
+
+
+def warming(usual: Opened, x: FloatArray) -> Change | None:
+    """Viscous friction that fades while a meter records, as gears get warm; None where it doesn't,
+    or too little. It is looked for with a meter alone: motors show friction itself.
+    """
+    if usual.estimate.meter is None or usual.estimate.motors is not None:
+        return None
+    about = _FirstOrder.of(usual, x)
+    along = about.along(FRICTION_FELL)
+    places, times = usual.times()
+    found = []
+    for number, run in enumerate(usual.estimate.runs):
+        rows = np.flatnonzero(places == number)
+        if not len(rows):
+            continue
+        begin = float(times[rows[0]])
+        fading = _FADING * (float(times[rows[-1]]) - begin)
+        if not fading > 0.0:
+            continue
+        stretch, moves = _stretches(usual, rows)
+        middle = np.bincount(stretch, times[rows]) / np.bincount(stretch)
+        fades = np.exp(-(middle - begin) / fading)
+        size, squares = _seen(about, along, rows, fades[stretch][:, None])
+        change = Change(run.name, FRICTION_FELL, begin, fading=fading, number=number)
+        change = replace(change, size=float(size[0]), likelier=0.5 * float(squares[0]))
+        low, high = _WARMED
+        if squares[0] < _ENOUGH or not low <= size[0] <= high:
+            continue
+        orders = shuffled(fades, moves)
+        as_much = np.concatenate(
+            [
+                _seen(about, along, rows, part.T[stretch])[1] >= squares[0]
+                for part in np.array_split(orders, _SHUFFLED // _AT_ONCE)
+            ]
+        )
+        if as_much.mean() <= _SELDOM:
+            found.append(change)
+    return max(found, key=lambda each: each.likelier, default=None)
+
+
+def shuffled(fades: FloatArray, moves: BoolArray) -> FloatArray:
+    """How much of the change holds in each stretch (S,), with the movements in other orders
+    (_SHUFFLED, S); rests stay.
+    """
+    rng = np.random.default_rng(0)
+    orders = np.tile(fades, (_SHUFFLED, 1))
+    orders[:, moves] = rng.permuted(orders[:, moves], axis=1)
+    return orders
+
+
+def _seen(
+    about: _FirstOrder, along: FloatArray, rows: IntArray, fades: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Sizes (K,) of changes that hold by fades (R, K) in some rows (R,), to first order, and by how
+    many squares they are nearer; negative ones where it is a rise.
+    """
+    columns = along[rows][:, None] * fades
+    power = np.square(columns).sum(axis=0)
+    alone = power - np.square(about.basis[rows].T @ columns).sum(axis=0)
+    projected = columns.T @ about.left[rows]
+    told = alone > 1e-9 * np.maximum(power, 1e-12)
+    size = np.divide(projected, alone, out=np.zeros_like(alone), where=told)
+    return size, np.asarray(size * np.abs(projected))
+
+
+def _stretches(usual: Opened, rows: IntArray) -> tuple[IntArray, BoolArray]:
+    """Numbers (R,) of the movements and rests that some rows lie in, from 0 on, and whether each of
+    these (S,) is a movement.
+    """
+    speeds = [by_window(run.prepared.speed) for run in usual.estimate.runs]
+    moving = (np.abs(np.concatenate(speeds)) > MOVING).any(axis=1)[usual.estimate.window[rows]]
+    stretch = np.cumsum(np.diff(moving, prepend=moving[:1]) != 0)
+    moves = np.zeros(int(stretch[-1]) + 1, bool)
+    moves[stretch] = moving
+    return stretch, moves
+
+
 # What is named: what makes the whole much likelier, and the rows of its smaller part as well.
 
 _KINDS = (WATTS, PAYLOAD, FRICTION_FELL)
@@ -603,7 +722,16 @@ _BY_ROW = 0.25  # of the smaller part: e^-0.5 of its squares are left
 
 def change(estimate: Estimate) -> Change | None:
     """What changed half-way; None where one set of parameters explains the recordings as well."""
-    found = changes(estimate)
+    usual = opened(estimate)
+    x = usual.fitted(usual.with_more(estimate.found))
+    found = changes(usual, x)
+    return _named(estimate, found) or warming(usual, x)
+
+
+def _named(estimate: Estimate, found: Sequence[Change]) -> Change | None:
+    """The likeliest of the changes that were found, with what else it may be; None where it is too
+    unlikely or too small.
+    """
     if not found or found[0].likelier < _LIKELIER[found[0].kind]:
         return None
     first = found[0]
@@ -625,10 +753,9 @@ def _smaller(estimate: Estimate, change: Change) -> int:
     return int(min(inside, len(estimate.window) - inside))
 
 
-def changes(estimate: Estimate) -> list[Change]:
-    """The likeliest changes of each kind, the likeliest first."""
-    usual = opened(estimate)
-    x = usual.fitted(usual.with_more(estimate.found))
+def changes(usual: Opened, x: FloatArray) -> list[Change]:
+    """The likeliest changes of each kind to a fit with parameters x, the likeliest first."""
+    estimate = usual.estimate
     starts = []
     for kind in _KINDS if estimate.meter is not None else _TORQUES:
         likeliest = _likeliest(kind, usual, x)
