@@ -3,6 +3,7 @@ at once.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -43,8 +44,7 @@ class CcdSettings:
                 raise KernelError(f"{name} is {getattr(self, name)}: it has to be 0 or more")
 
 
-@dataclass(frozen=True)
-class CcdResult:
+class CcdResult(NamedTuple):
     """Where every start ended, in the order of the starts.
 
     q (P, n) rad within the limits; psi (P,) of eq. 2, m^2; position_error (P,) m; rotation_error

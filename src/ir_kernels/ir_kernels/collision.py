@@ -7,6 +7,7 @@ body).
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -49,8 +50,7 @@ class MinDistance(Witnesses):
     """The nearest pair of each configuration; distance +inf and pair -1 where there is no pair."""
 
 
-@dataclass(frozen=True, eq=False)
-class Certificates:
+class Certificates(NamedTuple):
     """Verdicts (N,) FREE, COLLIDES or UNDECIDED; interval [t0, t1] (N,) of the first violation, and
     its pair (N,).
 
@@ -65,8 +65,7 @@ class Certificates:
     pair: IntArray
 
 
-@dataclass(frozen=True)
-class Certificate:
+class Certificate(NamedTuple):
     """The same for one trajectory: interval in s from its start, FREE: both at its end.
 
     lower_bound [m]: for FREE a proven lower bound of distance - threshold over all pairs and times,

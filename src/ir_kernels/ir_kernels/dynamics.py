@@ -7,8 +7,7 @@ the motors (`ir_kernels.coupling`).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,8 +30,7 @@ from ir_values.arrays import FloatArray
 # What the axes take from the DC link at most, between samples too.
 
 
-@dataclass(frozen=True)
-class PowerBounds:
+class PowerBounds(NamedTuple):
     """Of consecutive pieces of a trajectory: seconds (K,) that they last. In each the sum of the
     axes' powers is at every instant at most net (K,) W, the sum of those that take power at most
     taken (K,) W; rounding and Coulomb friction of either sign where a joint turns are included.
@@ -58,8 +56,7 @@ EXCEEDS = np.uint8(1)
 UNDECIDED = np.uint8(2)
 
 
-@dataclass(frozen=True)
-class TorqueBounds:
+class TorqueBounds(NamedTuple):
     """Enclosure of max over time of |tau(t)| / limit(qd(t)), per joint (n,).
 
     upper: never exceeded, rounding included. sampled: reached, at `time` s from the start of the
@@ -96,8 +93,7 @@ def torque_bounds(
 MAX_TERMS = 8  # of a polynomial segment
 
 
-@dataclass(frozen=True)
-class Gradients:
+class Gradients(NamedTuple):
     """Derivatives of a joint quantity y (torque, power): q, qd, qdd are (N, n, n), [k, i, j] = d
     y_i / d x_j.
     """

@@ -6,7 +6,7 @@ one without.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -140,8 +140,7 @@ FURTHER_LOSSES = (
 )
 
 
-@dataclass(frozen=True)
-class CounterbalanceData:
+class CounterbalanceData(NamedTuple):
     """Gas cylinder between a pivot on the link before `joint` and an eye on the link after it (all
     in the x-z plane).
 

@@ -29,8 +29,7 @@ KINDS = ("box", "cylinder", "sphere", "capsule", "plane", "mesh")
 SIZES = {"box": 3, "cylinder": 2, "sphere": 1, "capsule": 2, "plane": 0, "mesh": 0}
 
 
-@dataclass(frozen=True, eq=False)
-class Hull:
+class Hull(NamedTuple):
     """A convex polytope: vertices (V, 3), triangles (F, 3) and edges (E, 2) of vertex indices,
     outward face normals (F, 3) and their offsets (F,): x is inside when normals @ x <= offsets.
     """
@@ -149,8 +148,7 @@ class Pair(NamedTuple):
     body_b: str
 
 
-@dataclass(frozen=True, eq=False)
-class Capsules:
+class Capsules(NamedTuple):
     """C capsules: link (C,), ends (C, 2, 3) in the link frames, radius (C,)."""
 
     names: tuple[str, ...]
@@ -159,8 +157,7 @@ class Capsules:
     radius: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class Geometry:
+class Geometry(NamedTuple):
     """A chain with capsules in a scene; Z pairs, environment (E, 2: capsule, body) before self (S,
     2: capsules).
     """

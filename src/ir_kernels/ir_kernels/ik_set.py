@@ -3,8 +3,7 @@ last digits by Newton's steps.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,8 +15,7 @@ from ir_kernels.reference.inverse_kinematics import LIMIT_TOLERANCE
 from ir_values.arrays import FloatArray, IntArray
 
 
-@dataclass(frozen=True)
-class IkSet:
+class IkSet(NamedTuple):
     """Solutions sorted by pose, branch, q: q (M, 6) rad, pose_index (M,) which pose each belongs
     to, branch (M,): its number, see the solver.
     """

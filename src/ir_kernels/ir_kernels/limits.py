@@ -2,7 +2,7 @@
 points as well.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,8 +17,7 @@ from ir_values.arrays import FloatArray
 COMPILED_TERMS = 16  # of a polynomial, beyond them the reference works
 
 
-@dataclass(frozen=True)
-class Extrema:
+class Extrema(NamedTuple):
     """Smallest and largest values of polynomials (S, n) and when they are taken, s from the start
     of the segment.
     """

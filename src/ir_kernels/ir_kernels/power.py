@@ -7,7 +7,7 @@ resistor.
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -46,8 +46,7 @@ class DcBusParameters:
             )
 
 
-@dataclass(frozen=True)
-class DcBus:
+class DcBus(NamedTuple):
     """Step by step: mains (N,) W drawn for the axes, dissipated (N,) W in the resistor, stored (N,)
     J after the step.
     """

@@ -16,7 +16,7 @@ CollisionModel.certify_trajectory and DynamicsModel.torque_bounds.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,8 +35,7 @@ SAME_CHAIN = 1e-5
 MOST_EVALUATIONS = 2**31 - 1
 
 
-@dataclass(frozen=True, eq=False)
-class SplineValue:
+class SplineValue(NamedTuple):
     """Cost; gradient (K, n) by the control points; derivative by the interval; energy [J] of the
     axes at the mains.
     """
@@ -47,8 +46,7 @@ class SplineValue:
     energy: float
 
 
-@dataclass(frozen=True)
-class SplineStarts:
+class SplineStarts(NamedTuple):
     """How splines are laid along paths: `spacing` s between knots where the path is at full speed,
     within `fewest` and `most` control points between the ends; `slower` by that factor, or over
     `duration` s.
@@ -61,8 +59,7 @@ class SplineStarts:
     duration: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class CubicPath:
+class CubicPath(NamedTuple):
     """p(s), s in [0, 1]: breaks (B + 1,); cubics (4, B, n), lowest power first, in s from the break
     before each.
     """
@@ -71,8 +68,7 @@ class CubicPath:
     cubics: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class ProfileDescent:
+class ProfileDescent(NamedTuple):
     """Where a descent on a speed profile ended: s (C,) at the inner knots, duration [s], cost, and
     how many evaluations it took.
     """
@@ -83,8 +79,7 @@ class ProfileDescent:
     evaluations: int
 
 
-@dataclass(frozen=True, eq=False)
-class SplineDescent:
+class SplineDescent(NamedTuple):
     """Where a descent ended: control (K, n), interval [s], cost, and how many evaluations it
     took.
     """

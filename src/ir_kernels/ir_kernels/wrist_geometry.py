@@ -8,7 +8,7 @@ plane normal to z2: z + i x, with z along z1 and x = z2 x z1, because a turn by 
 multiplies them by exp(i q).
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,8 +28,7 @@ MEETING = 1e-9  # m: axes 5 and 6 that come so near meet
 PARALLEL = 1e-9  # of |z2 x z3|
 
 
-@dataclass(frozen=True)
-class ArmLines:
+class ArmLines(NamedTuple):
     """z (6, 3): directions; o (6, 3): a point of each, those of axes 5 and 6 the nearest to each
     other; in the frame of link 0 at q = 0. hand (4, 4): pose of link 6 there. meet: whether axes 5
     and 6 meet.
@@ -94,8 +93,7 @@ POINT_TOLERANCE = 1e-9  # m: by how much axes 4, 5, 6 may miss each other
 ANGLE_TOLERANCE = 1e-9  # of the scalar products that have to vanish
 
 
-@dataclass(frozen=True)
-class WristGeometry:
+class WristGeometry(NamedTuple):
     """See the module. All in the frame of link 0 at q = 0; arrays are read-only."""
 
     axis: FloatArray  # (6, 3) z_i

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,8 +37,7 @@ class Mode(IntEnum):
     EMERGENCY_STOP = 20
 
 
-@dataclass(frozen=True)
-class ModeRow:
+class ModeRow(NamedTuple):
     """A mode that can last. depth: 0 for motors on. entering, leaving: its transitions, itself for
     none.
 
@@ -135,8 +135,7 @@ def checked_mode(number: int) -> Mode:
 # How long a rest takes, alone and as the last of several.
 
 
-@dataclass(frozen=True)
-class RestTimes:
+class RestTimes(NamedTuple):
     """Seconds of a mode to rest in: from asking for it until it is reached (enter), at least in it
     (stay), and back to motors on (leave).
     """

@@ -7,6 +7,7 @@ and why.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +20,7 @@ def _nowhere() -> FloatArray:
     return np.zeros((0, 3))
 
 
-@dataclass(frozen=True, eq=False)
-class WithdrawalLog:
+class WithdrawalLog(NamedTuple):
     """A withdrawal from a station (eq. 7). kept (N, 3) m: positions of the tool at the
     configurations that were kept, the station first, each with the index of its parent (N,);
     dropped (M, 3): some of those that came too near something. path (L, 3): along what was left of
@@ -45,8 +45,7 @@ class WithdrawalLog:
     blocked: str = ""
 
 
-@dataclass(frozen=True, eq=False)
-class Track:
+class Track(NamedTuple):
     """One random start: positions (K, 3) m of the tool from sweep to sweep; why it was rejected,
     "": it was accepted.
     """
@@ -55,8 +54,7 @@ class Track:
     points: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class ConfigurationLog:
+class ConfigurationLog(NamedTuple):
     """A search for configurations at a station by cyclic coordinate descent (eqs. 1 to 6): of
     `starts` random ones so many were accepted, of which so many are distinct; tracks: of the first
     starts.

@@ -5,7 +5,8 @@ its end; where the end is not known, the robot is woken at the end and ready whe
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,8 +26,7 @@ POSTURES_MAX = 20  # two movements are planned for each
 Plan = Callable[[FloatArray, Goal], MovementPlan]
 
 
-@dataclass(frozen=True, eq=False)
-class Trip:
+class Trip(NamedTuple):
     """To a posture q (n,) and back.
 
     there, back: seconds and joules at the mains of both movements.

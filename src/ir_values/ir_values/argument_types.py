@@ -12,11 +12,10 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache, cached_property, partial, wraps
 from numbers import Integral, Real
 from types import NoneType, UnionType
-from typing import Any, ParamSpec, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, NamedTuple, ParamSpec, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -151,8 +150,7 @@ def described(kind: Any) -> str:
     return name or f"a {getattr(origin or kind, '__name__', kind)}"
 
 
-@dataclass(frozen=True)
-class _Argument:
+class _Argument(NamedTuple):
     """One argument; converted: a list is handed on as the array that it was looked at as, so that
     long ones are converted once.
     """

@@ -7,9 +7,9 @@ line is at hand.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -188,8 +188,7 @@ def _robot(item: Item, robots: RobotSource, folder: Path | None) -> RobotModel:
             raise InvalidValueError(str(error)) from error
 
 
-@dataclass(frozen=True)
-class _Placed:
+class _Placed(NamedTuple):
     """Something read, with the item it came from."""
 
     item: Item

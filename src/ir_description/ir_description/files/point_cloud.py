@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from itertools import permutations
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,8 +40,7 @@ ROUNDING = 1e-9
 """Added to every margin [m]: more than all rounding of the places of boxes."""
 
 
-@dataclass(frozen=True, eq=False)
-class SensedPoints:
+class SensedPoints(NamedTuple):
     """What a depth sensor saw, in the file's unit: points (N, 3), or heights (R, C) over a grid
     whose sample [r, c] stands at x = c pitch, y = r pitch (NaN where nothing was seen).
 
@@ -53,8 +52,7 @@ class SensedPoints:
     notes: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class CloudBoxes:
+class CloudBoxes(NamedTuple):
     """Boxes along the cloud's axes: lower and upper corners (B, 3) [m].
 
     No point of a box is farther than `protrusion` [m] from the cloud, or from what is solid below a

@@ -6,7 +6,7 @@ it is const - 2 ((k2 - k1) cos phi + k3 sin phi): the minimum is closed form, an
 better one of both.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,8 +21,7 @@ DAMPING_LEAST = 1e-12
 DAMPING_MOST = 1e6
 
 
-@dataclass(frozen=True)
-class Problem:
+class Problem(NamedTuple):
     """Chain (origins, axes, base, tcp), pose (4, 4) in the world, limits (n,), lambda [m/rad] of
     eq. 2.
     """

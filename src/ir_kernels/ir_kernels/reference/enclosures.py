@@ -5,7 +5,7 @@ whose excess shrinks with the square of the piece. Coulomb friction is of either
 velocity may vanish, none where the joint rests through the segment.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,8 +25,7 @@ from ir_kernels.reference.limits import derivative, evaluate
 from ir_values.arrays import BoolArray, FloatArray, IntArray
 
 
-@dataclass(frozen=True)
-class Pieces:
+class Pieces(NamedTuple):
     """Times begin..end (K,) within the segments (K,)."""
 
     segment: IntArray
@@ -34,8 +33,7 @@ class Pieces:
     end: FloatArray
 
 
-@dataclass(frozen=True)
-class Enclosure:
+class Enclosure(NamedTuple):
     """Per motor over the pieces (K,): step = t - m; speed, torque without Coulomb friction and that
     friction; at the middles, and over the pieces with their derivatives.
     """

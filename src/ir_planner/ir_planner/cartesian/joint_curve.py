@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -228,8 +228,7 @@ _FARTHEST = 0.3  # rad of a step
 _BETTER = 1e-3  # relative: below, no further step is worth it
 
 
-@dataclass(frozen=True, eq=False)
-class _Problem:
+class _Problem(NamedTuple):
     """basis (N, C): angles at the chain's samples by control points; free_angle [rad]; fixed: the
     first control point stays.
     """

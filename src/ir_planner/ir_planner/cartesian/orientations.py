@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
 
-@dataclass(frozen=True)
-class RotationRates:
+class RotationRates(NamedTuple):
     """Bounds of a rotation's derivatives along a path: first of R' [rad/m], second of R''
     [rad/m^2].
 

@@ -1,6 +1,7 @@
 """The movement along a path: the cheapest chains of configurations with their times, certified."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,8 +38,7 @@ _LIMITS = ("velocity", "acceleration", "jerk")
 _FARTHER = 0.93
 
 
-@dataclass(frozen=True, eq=False)
-class DrivenPath:
+class DrivenPath(NamedTuple):
     """A chain as a movement, and what it keeps of the path; slower: the share of its speed that T1
     leaves;
     longer: its ramps reach as far as it takes.

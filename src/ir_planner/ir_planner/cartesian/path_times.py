@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -319,8 +319,7 @@ _ROUNDS_POINTS = 10
 _SHORTEST_NS = 400_000
 
 
-@dataclass(frozen=True, eq=False)
-class SentPath:
+class SentPath(NamedTuple):
     """The trajectory with its strokes, when each begins (K,) s, and the law's instants of its
     points (K of (P,) s).
     """

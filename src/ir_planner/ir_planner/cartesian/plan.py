@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -190,8 +190,7 @@ _SAME = 1e-3  # rad: chains that are nearer are one
 _TURNS = (-2, -1, 0, 1, 2)
 
 
-@dataclass(frozen=True, eq=False)
-class ChosenMovement:
+class ChosenMovement(NamedTuple):
     """A movement along a path with its configurations (N, n) from its beginning to its end."""
 
     points: FloatArray

@@ -4,6 +4,7 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -119,8 +120,7 @@ def ramp_places(
 # takes.
 
 
-@dataclass(frozen=True, eq=False)
-class DrivenMotion:
+class DrivenMotion(NamedTuple):
     """Motion at M instants: t (M,) s, s (M,) m along the path, speed (M,) m/s; q, qd, qdd, qddd (M,
     n).
     """

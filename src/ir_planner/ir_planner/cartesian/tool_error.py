@@ -1,6 +1,7 @@
 """The error of the tool: bounds of its distance from the path, its turn and its speed."""
 
 from dataclasses import astuple, dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -63,8 +64,7 @@ def kept_of(
     return kept
 
 
-@dataclass(frozen=True, eq=False)
-class _Stroke:
+class _Stroke(NamedTuple):
     """Stroke k of a path that is sent, with bounds of the tool's motion."""
 
     sent: SentPath

@@ -6,7 +6,7 @@ import itertools
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -305,8 +305,7 @@ _SHRINK = 0.8
 _SAMPLES = 129
 
 
-@dataclass(frozen=True)
-class Joint:
+class Joint(NamedTuple):
     """radius [m], 0: the tool stops; angle [rad] of the corner; leaves, turns: by what smoothing
     leaves the parts [m, rad]; rounded: as asked for, which leaves them on purpose.
     """

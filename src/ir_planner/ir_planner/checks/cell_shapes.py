@@ -2,7 +2,7 @@
 movement.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,8 +23,7 @@ PATH: Colour = (0.1, 0.4, 0.9, 1.0)
 CLOSEST: Colour = (0.9, 0.1, 0.1, 1.0)
 
 
-@dataclass(frozen=True, eq=False)
-class Shape:
+class Shape(NamedTuple):
     """kind "box", "cylinder", "sphere", "line", "triangles" or "text"; pose (4, 4), size (3,) m,
     points (P, 3).
     """

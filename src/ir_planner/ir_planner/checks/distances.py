@@ -2,7 +2,7 @@
 a profile.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +32,7 @@ _LOOSER = 4.0  # times as much where that can't be proved
 _PROOFS = 12
 
 
-@dataclass(frozen=True, eq=False)
-class ClearanceProfile:
+class ClearanceProfile(NamedTuple):
     """times (N,) s and distances (N,) m of the nearest pair without a safety distance of its
     own (inf: no pair).
 
@@ -128,8 +127,7 @@ def clearance_profile(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Lowest:
+class _Lowest(NamedTuple):
     """When the nearest pair is nearest [s], its distance there, and what no distance at any instant
     is below.
     """

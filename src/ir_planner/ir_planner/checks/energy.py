@@ -7,7 +7,7 @@ most 1 ms. Alone, a movement starts with an empty capacitor; what is left in it 
 credited, but given to the next movement of a program (`carried`).
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,8 +22,7 @@ STEP_S = 1e-3
 _PIECE = 20_000  # samples at a time: an hour has millions
 
 
-@dataclass(frozen=True)
-class MovementEnergy:
+class MovementEnergy(NamedTuple):
     """Joules of a movement: total at the mains, base load, per joint (n,) at the DC link (signed),
     dissipated, capacitor.
 

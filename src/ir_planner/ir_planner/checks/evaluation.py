@@ -3,7 +3,7 @@ is proved.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,8 +27,7 @@ from ir_planner.scene import (
 from ir_values.arrays import FloatArray
 
 
-@dataclass(frozen=True)
-class Consumption:
+class Consumption(NamedTuple):
     """What objectives count of a movement, named as in its report; known before distances and peaks
     are.
     """

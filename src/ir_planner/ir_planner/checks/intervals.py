@@ -11,8 +11,9 @@ All energies of one set of parameters are sampled over the same drawn robots, so
 of two energies has an interval of its own, mostly far narrower than theirs.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,8 +30,7 @@ STEP_S = 8e-3  # intervals need no finer samples than these
 _MOST = 20_000  # samples: what lasts longer is sampled more coarsely
 
 
-@dataclass(frozen=True, eq=False)
-class Sampled:
+class Sampled(NamedTuple):
     """A motion at the middles of N steps of dt s, and how long it takes [s]."""
 
     motion: MotionSamples
@@ -113,8 +113,7 @@ def standing_slope(
     return slope
 
 
-@dataclass(frozen=True, eq=False)
-class _States:
+class _States(NamedTuple):
     """motion, torque (N, n) Nm, and price (N, n): mains joules per watt of an axis in a sample."""
 
     motion: MotionSamples
@@ -190,8 +189,7 @@ def _load_torque(at: _States, scene: PlanningScene) -> FloatArray:
     return at.torque - scene.unloaded.inverse_dynamics(*at.motion[:3])
 
 
-@dataclass(frozen=True)
-class JouleInterval:
+class JouleInterval(NamedTuple):
     """5 % and 95 % quantile, J."""
 
     low: float

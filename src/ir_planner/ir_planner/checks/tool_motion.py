@@ -9,8 +9,8 @@ so on, each at most the product of the axes' derivatives and the distance from t
 the term; with all distances 1 it holds for the rotation.
 """
 
-from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,8 +23,7 @@ from ir_values.arrays import FloatArray, IntArray
 # Bounds of the derivatives of places of the tool on each segment of a trajectory.
 
 
-@dataclass(frozen=True, eq=False)
-class ToolDerivatives:
+class ToolDerivatives(NamedTuple):
     """Bounds (S,) on each segment: of |p''| [m/s^2], |p'''| [m/s^3] and |p''''| [m/s^4] of a place,
     and of |R''| [rad/s^2] of the rotation, as 1 / sqrt(2) of the Frobenius norm, and of |w''|
     [rad/s^3] of its turning speed; times (S + 1,) s.
@@ -189,8 +188,7 @@ _REPORTED_RESOLUTION = 0.02
 _REPORTED_AT_ONCE = 1_000  # instants that cost less than another round
 
 
-@dataclass(frozen=True, eq=False)
-class Largest:
+class Largest(NamedTuple):
     """Of one kind of points on each segment (S,): bounds of speed [m/s] and acceleration [m/s^2],
     and what was found of both at instants.
     """

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -415,8 +416,7 @@ class Verification:
         return Status(StatusCode.INVALID_MOTION_PLAN, sentence)
 
 
-@dataclass(frozen=True, eq=False)
-class TorqueProof:
+class TorqueProof(NamedTuple):
     """upper (n,): guaranteed bound of the share of the torque envelope that is used; the violation
     where it exceeds what may be used.
     """

@@ -10,8 +10,7 @@ t_n / 2; only with a_f t_n^2 / 2 do the end conditions hold.)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -22,8 +21,7 @@ if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
 
-@dataclass(frozen=True)
-class JointSpline:
+class JointSpline(NamedTuple):
     """Knots (K,) s with q, qd, qdd (K, n) at each; between knots every joint is a cubic, so nothing
     else is needed.
     """

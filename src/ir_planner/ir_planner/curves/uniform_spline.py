@@ -8,6 +8,7 @@ forms.
 """
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -69,8 +70,7 @@ def _at(path: FloatArray, passed: FloatArray, at: FloatArray) -> FloatArray:
     return np.asarray(slope * (at - passed[k])[:, None] + path[k])
 
 
-@dataclass(frozen=True, eq=False)
-class Tops:
+class Tops(NamedTuple):
     """Largest |qd|, |qdd| and |qddd| of a motion, each (n,)."""
 
     velocity: FloatArray

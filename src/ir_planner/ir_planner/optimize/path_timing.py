@@ -9,7 +9,7 @@ is measured. Points are then passed exactly by the correction of least jerk, whe
 time.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -204,8 +204,7 @@ _LITTLE = 1e-9  # weight of the size of a correction beside its jerk
 _STEPS = 3  # of Newton's towards the nearest place
 
 
-@dataclass(frozen=True, eq=False)
-class Passing:
+class Passing(NamedTuple):
     """points (P, n) are passed `at` (P,), in knots from the beginning; none where they were too
     dense.
     """
@@ -334,8 +333,7 @@ _ROUNDING = 1e-9  # relative
 _LONGER = 1.03  # what passing points exactly may cost in time
 
 
-@dataclass(frozen=True)
-class TimingEffort:
+class TimingEffort(NamedTuple):
     """Evaluations of the cost per descent; in each the stiffness of the penalties, against the
     objective's power, and the W over which the DC link's switch is rounded. Each has twice the
     knots of the one before.
@@ -351,8 +349,7 @@ QUICK_TIMING = TimingEffort(250, ((40.0, 100.0), (400.0, 5.0)))
 THOROUGH_TIMING = TimingEffort(250, ((40.0, 100.0), (40.0, 20.0), (400.0, 3.0)))
 
 
-@dataclass(frozen=True, eq=False)
-class PathTiming:
+class PathTiming(NamedTuple):
     """A motion along a path within the limits, and by how much it leaves the path [rad]."""
 
     trajectory: JointTrajectory

@@ -9,6 +9,7 @@ refined movement is the answer, and more work makes it better.
 """
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -85,8 +86,7 @@ _OUT_OF_REACH = 1.25  # times the cost of the best: coarse solutions above are n
 Look = tuple[Solution, FloatArray]  # a coarse solution, and the guess (M, n) that it came from
 
 
-@dataclass(frozen=True)
-class _Shares:
+class _Shares(NamedTuple):
     """Evaluations from every guess, then from those that are followed; how many of these get as
     many as a free path.
     """

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -64,8 +65,7 @@ def blend_at(route: Route, place: int, asked: float) -> float:
     return route.scenes.cell.station(step.target).blend if step.kind == "STATION" else 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class PassedPlace:
+class PassedPlace(NamedTuple):
     """Where a program stands still between two movements: its name, the joints (n,) [rad], and how
     near [m] it may be passed instead. stop: its name where it is one, "": the end of a line.
     """

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from ir_msgs_py.report import MovementKind, PlannedMovement, TrajectoryReport
 from ir_msgs_py.trajectory import JointTrajectory
@@ -91,8 +91,7 @@ class JoinedMovement:
     passes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class LegMovement:
+class LegMovement(NamedTuple):
     """A movement of a leg: from where to where, and `station`, whose allowed contacts hold."""
 
     kind: MovementKind
@@ -103,8 +102,7 @@ class LegMovement:
     passes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class Leg:
+class Leg(NamedTuple):
     """How a stop is reached: its movements, and the scene in which they run."""
 
     to_name: str

@@ -1,6 +1,6 @@
 """Lower bounds of a movement's cost on any path: from limits, friction and weight."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,8 +24,7 @@ from ir_values.arrays import FloatArray
 _PLACES = 64
 
 
-@dataclass(frozen=True)
-class Rates:
+class Rates(NamedTuple):
     """What is minimised, as cost per joule of the drives and per second."""
 
     joule: float

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,8 +40,7 @@ class Timed:
     energy: float
 
 
-@dataclass(frozen=True, eq=False)
-class CycleTask:
+class CycleTask(NamedTuple):
     """seconds: for movements and the wait. waiting(seconds): joules of the wait. slower(movement,
     seconds): the same in more seconds, None where that isn't certified. spent: joules of a whole
     program, with carried charge.
@@ -280,8 +280,7 @@ def _too_short(best: "_Tried", cycle_time: float, standing: float) -> StageError
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Tried:
+class _Tried(NamedTuple):
     """A chain in a cycle: its movements by value, the rung that it needs, its program (None: too
     slow).
     """

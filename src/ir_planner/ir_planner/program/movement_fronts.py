@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -170,8 +171,7 @@ class Ladder:
 _POOR = 1e-3
 
 
-@dataclass(frozen=True, eq=False)
-class FrontPoint:
+class FrontPoint(NamedTuple):
     """A certified movement of a part, with its seconds and the drives' joules."""
 
     movement: Movement
@@ -189,8 +189,7 @@ class FrontPoint:
         return rates.joule * self.joules + rates.second * self.seconds
 
 
-@dataclass(frozen=True)
-class SlowDown:
+class SlowDown(NamedTuple):
     """From a point of a part to the next slower one: seconds more, joules less."""
 
     part: HopPart

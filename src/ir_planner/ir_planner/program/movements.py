@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 from ir_description.cell import StepVia
 from ir_msgs_py.report import TrajectoryReport
@@ -133,8 +133,7 @@ class MovementSource(Protocol):
         """The movement of a part that was planned; None where none was found."""
 
 
-@dataclass(frozen=True, eq=False)
-class WarmStarts:
+class WarmStarts(NamedTuple):
     """Known movements from which others are made, instead of searched: across, by descent from the
     best of those of `across`; along service lines, those of `lines` slowed down, or by descent from
     those of `scaling`. Those of them that can plan do so first.

@@ -1,7 +1,8 @@
 """Pauses of a program as they are sent: their modes, their energy, and the capacitor's charge."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import accumulate
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,8 +16,7 @@ from ir_values.arrays import FloatArray
 AUTO = "AUTO"
 
 
-@dataclass(frozen=True, eq=False)
-class PlannedPause:
+class PlannedPause(NamedTuple):
     """Where (a name, and q (n,)), how long [s], in which mode it was asked for (AUTO; "": not
     said), and what is held.
     """

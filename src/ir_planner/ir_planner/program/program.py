@@ -3,7 +3,8 @@
 import hashlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -345,8 +346,7 @@ def program_hash(movements: tuple[PlannedMovement, ...]) -> str:
 # what coarse movements cost that meet nothing. That takes a small part of the work of planning it.
 
 
-@dataclass(frozen=True)
-class Outlook:
+class Outlook(NamedTuple):
     """status: why a stop has no configuration that can be entered and left. cost: by the objective,
     without a cycle time, of the cheapest chain of coarse movements, less their margin; inf where
     the status says why.

@@ -1,8 +1,8 @@
 """The common program, and what the planner's program saves against it in the same seconds."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TypeVar
+from dataclasses import replace
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -35,8 +35,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
-@dataclass(frozen=True, eq=False)
-class CommonProgram:
+class CommonProgram(NamedTuple):
     """Its chain with the movements of all parts; `around` of its `across` regional movements run
     around bodies.
     """
@@ -246,8 +245,7 @@ def _energy(steps: Sequence[PlannedMovement]) -> float:
 _ENDED = "planning_time or max_iterations ended before the common program was compared"
 
 
-@dataclass(frozen=True, eq=False)
-class SavingsComparison:
+class SavingsComparison(NamedTuple):
     """Savings, of which steps, what was compared in words, and the steps of the common program."""
 
     savings: ProgramSavings

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from ir_description import (
     Cell,
@@ -137,8 +138,7 @@ def _of_machine(cell: Cell, machine: Equipment, target: str, states: tuple[str, 
 STEPS_MAX = 500
 
 
-@dataclass(frozen=True)
-class PlacedStep:
+class PlacedStep(NamedTuple):
     """A step with the parts and the doors before and after it."""
 
     step: ProgramStep

@@ -8,7 +8,8 @@ guesses; the stop and go around it (braking, a movement from rest to rest, getti
 the descent from that one. So no answer costs more than that stop and go.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,8 +44,7 @@ _REFINED = 1  # of the cheapest coarse solutions, where no work is asked for
 _AWAY = 1e-3  # rad: a goal that is nearer than that has no path to it
 
 
-@dataclass(frozen=True, eq=False)
-class MovingEnd:
+class MovingEnd(NamedTuple):
     """q, qd, qdd (n,) at the start of a movement, or at its goal as it looks backwards in time."""
 
     q: FloatArray

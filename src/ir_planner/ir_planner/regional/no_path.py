@@ -10,7 +10,7 @@ single balls and joints are followed.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,8 +37,7 @@ _FAR = 1e3  # m
 Index = tuple[int, int, int]
 
 
-@dataclass(frozen=True, eq=False)
-class Reach:
+class Reach(NamedTuple):
     """Where joint 2 of an arm may be, a circle about the axis (3,) of joint 1 through its origin
     (3,): height above the origin and radius [m]; steps (n - 1,): from each later joint to the next,
     added up.
@@ -69,8 +68,7 @@ class Reach:
         return float(self.steps[link - 2]) + offset
 
 
-@dataclass(frozen=True, eq=False)
-class BallField:
+class BallField(NamedTuple):
     """left (X, Y, Z) m: distance of each cube's centre from the bodies less what they must keep,
     `_FAR` where that is more than any ball needs; nearest (X, Y, Z): number of that body; low (3,):
     the first centre; circle (X, Y, Z) m: distance from where joint 2 may be.
@@ -186,8 +184,7 @@ _FIRST_LINK = 3  # balls of the forearm and of what follows
 _HALVINGS = 6  # of the radius, towards the widest passage
 
 
-@dataclass(frozen=True, eq=False)
-class Ball:
+class Ball(NamedTuple):
     """A capsule's end: name and link of the capsule, the point (3,) in the link's frame, radius
     [m].
     """
@@ -198,8 +195,7 @@ class Ball:
     radius: float
 
 
-@dataclass(frozen=True, eq=False)
-class EndEnclosure:
+class EndEnclosure(NamedTuple):
     """end: "start" or "goal", that which is in the smaller part of the space; the capsule that
     can't leave it, the body at the widest passage out of it, the clearance there and what the pair
     must keep [m].
@@ -303,8 +299,7 @@ def _balls(space: FreeSpace) -> list[Ball]:
 _VALUES = 181  # of a joint that are tried: 2 degrees apart over a whole turn
 
 
-@dataclass(frozen=True)
-class Barrier:
+class Barrier(NamedTuple):
     """The value [rad] of a joint that no path passes, the pair that is too near there whatever the
     other joints are, the largest distance that it has there and what it must keep [m].
     """

@@ -12,7 +12,8 @@ side of it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,8 +29,7 @@ _GRID = 200  # speeds among which the one is sought from which on the voltage bo
 _LEAST = 0.02  # of U that is left at full speed
 
 
-@dataclass(frozen=True)
-class LinkVoltage:
+class LinkVoltage(NamedTuple):
     """Of the DC link [V]: nominal, for which drives are made, and as it is."""
 
     nominal: float

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ir_description.robot import ToolLimits
 
 
-@dataclass(frozen=True)
-class PointBounds:
+class PointBounds(NamedTuple):
     """speed [m/s] and acceleration [m/s^2] that a point may have; inf: any."""
 
     speed: float = np.inf
@@ -40,8 +39,7 @@ class PointBounds:
 ANY = PointBounds()
 
 
-@dataclass(frozen=True)
-class ToolBounds:
+class ToolBounds(NamedTuple):
     """Of the tcp, and of every point of the capsules of tool and part."""
 
     tcp: PointBounds = ANY

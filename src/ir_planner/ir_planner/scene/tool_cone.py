@@ -10,6 +10,7 @@ bounded by those at both ends; what that leaves open is divided until it is deci
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,8 +35,7 @@ _STRAIGHT = 1e-9  # sine of a tilt at which every way back is as near
 _UPSIDE = 0.5 * np.pi
 
 
-@dataclass(frozen=True, eq=False)
-class TiltProof:
+class TiltProof(NamedTuple):
     """ok (P,): pieces on which the tilt is proved to stay below a level. time (P,): in a piece's
     local time, where it does not; largest [rad]: of all tilts that were looked at.
     """

@@ -6,7 +6,7 @@ parameters under that name, and the documentation lists it.
 """
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 from ir_planner.checks import FreeSpace
 from ir_values.arrays import FloatArray
@@ -20,8 +20,7 @@ class Ends:
     goals: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class Stretch:
+class Stretch(NamedTuple):
     """A stretch that collided, between its free ends begin and end (n,), and the fitness of the
     best individual of every generation that was bred for it; the straight stretch's cost counts 1.
     """

@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, is_dataclass
 from types import MappingProxyType
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 from ir_msgs_py.status import StatusCode
 from ir_planner.checks import FreeSpace
@@ -62,8 +62,7 @@ def made_search(name: str, value: Any) -> Search:
     return cast(Search, search)
 
 
-@dataclass(frozen=True)
-class Role:
+class Role(NamedTuple):
     """Turns of a search in the default portfolio, 0: none.
 
     first: among those for the first path, by what they cost where the straight movement collides

@@ -5,7 +5,7 @@ the budget, so that a request can be stopped between them.
 """
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -39,8 +39,7 @@ _MARGIN = 1.0  # rad
 _FIRST = 64  # nodes that a tree has room for at first
 
 
-@dataclass(frozen=True, eq=False)
-class TreeMeeting:
+class TreeMeeting(NamedTuple):
     """A free path (M, n), or None; then gap [rad]: how near the trees came, each joint by its
     scale.
     """

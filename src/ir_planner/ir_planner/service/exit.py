@@ -5,7 +5,7 @@ zone.
 from collections import Counter
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -160,8 +160,7 @@ class Exit:
         return bool(self.outside.states_free(q[beyond]).all())
 
 
-@dataclass(frozen=True, eq=False)
-class WalkRecord:
+class WalkRecord(NamedTuple):
     """Configurations (N, n) that were kept, the interaction configuration first, each with the
     index of its parent (N,); `dropped` (M, n): those that came too near something. distance: the
     total metric distance D [m] at the interaction configuration and the largest one.

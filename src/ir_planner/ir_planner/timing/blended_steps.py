@@ -8,7 +8,7 @@ exact trajectory with a point per switch.
 """
 
 import itertools
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +17,7 @@ from ir_planner.timing.jerk_limited_laws import GRID_NS, StepLaws
 from ir_values.arrays import FloatArray, IntArray
 
 
-@dataclass(frozen=True)
-class TimedPath:
+class TimedPath(NamedTuple):
     """Waypoints (M, n) rad, the laws of each of the M-1 steps, and how long neighbours overlap
     [grid steps] (M-2).
     """

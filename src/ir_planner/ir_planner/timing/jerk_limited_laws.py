@@ -13,7 +13,7 @@ rounding durations up never breaks a limit.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -24,8 +24,7 @@ GRID_NS = 1_000_000
 _NEWTON_STEPS = 40
 
 
-@dataclass(frozen=True)
-class LawLimits:
+class LawLimits(NamedTuple):
     """Bounds of s, arrays (K,) of K candidate laws: speed 1/s, acceleration and braking 1/s^2,
     their jerks 1/s^3.
     """
@@ -101,8 +100,7 @@ def phase_steps(limits: LawLimits) -> IntArray:
     return steps
 
 
-@dataclass(frozen=True)
-class LawStates:
+class LawStates(NamedTuple):
     """Laws at the 8 switches of their phases: times (K, 8) s, s, its derivatives (K, 8), and jerk
     (K, 7).
     """

@@ -8,6 +8,7 @@ to no other.
 from collections.abc import Callable
 from dataclasses import InitVar, dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 from ir_kernels import portable
 from ir_msgs_py.report import TrajectoryReport
@@ -33,8 +34,7 @@ from ir_planner.timing.objective import coarse_cost, coarse_energy_cost, request
 from ir_values.arrays import FloatArray
 
 
-@dataclass(frozen=True)
-class Premises:
+class Premises(NamedTuple):
     """What a proof is made with. safety_distance: S_m [m]. station: whose contacts are allowed.
     at_rest: at the start and at the goal. tilt: largest [rad], axis and direction of the tool.
     tool: largest speed [m/s], acceleration [m/s^2], and whether of the whole tool.

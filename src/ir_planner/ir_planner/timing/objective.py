@@ -5,7 +5,8 @@ time_and_energy: J = E_drive + time_value x T. What controller and tool always d
 it is part of what a second is worth.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -74,8 +75,7 @@ def request_cost(report: Consumed, options: PlanOptions) -> float:
     return objective_value(report, options.objective, options.time_value)
 
 
-@dataclass(frozen=True, eq=False)
-class ObjectiveWeights:
+class ObjectiveWeights(NamedTuple):
     """Cost of a joule of the drives, of a second, and of a rad of each joint (n,); `power`: about
     what a second of movement costs in all.
     """

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -61,8 +62,7 @@ class Via:
         object.__setattr__(self, "distance", distance)
 
 
-@dataclass(frozen=True)
-class Nearness:
+class Nearness(NamedTuple):
     """How near a place is passed: tolerance [rad] of every joint; with distance [m] above 0 of the
     tcp's orientation, and that of the tcp.
     """

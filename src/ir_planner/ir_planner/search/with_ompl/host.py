@@ -20,6 +20,7 @@ from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from multiprocessing.connection import Connection
 from multiprocessing.reduction import send_handle
+from typing import NamedTuple
 
 from ir_msgs_py.status import StatusCode
 from ir_planner.errors import RequestError
@@ -61,8 +62,7 @@ class OmplProblem:
     seconds: float
 
 
-@dataclass(frozen=True, eq=False)
-class OmplAnswer:
+class OmplAnswer(NamedTuple):
     """A path (M, n), None where none was found; checks in edges; error: why OMPL could not be
     asked; unusable: because it is installed but can't be loaded.
     """
