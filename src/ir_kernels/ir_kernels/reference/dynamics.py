@@ -40,7 +40,6 @@ def _outward(
     cos: Sequence[Number],
     qd: Sequence[Number],
     qdd: Sequence[Number],
-    with_gravity: bool,
 ) -> tuple[list[Matrix], list[Vector], list[Vector]]:
     """Rotation of each link in the one before, and force and moment that its motion takes, in its
     frame.
@@ -48,7 +47,7 @@ def _outward(
     zero = qd[0] * 0.0
     spin: Vector = (zero, zero, zero)
     spin_rate: Vector = (zero, zero, zero)
-    lift = vector(-data.gravity if with_gravity else 0.0 * data.gravity)
+    lift = vector(-data.gravity)
     acceleration: Vector = (zero + lift[0], zero + lift[1], zero + lift[2])
     rotations: list[Matrix] = []
     forces: list[Vector] = []
@@ -88,10 +87,9 @@ def rigid_body_torque(
     cos: Sequence[Number],
     qd: Sequence[Number],
     qdd: Sequence[Number],
-    with_gravity: bool = True,
 ) -> list[Number]:
     """H qdd + h per joint, for any kind of number (arrays, complex steps, intervals)."""
-    rotations, forces, moments = _outward(data, sin, cos, qd, qdd, with_gravity)
+    rotations, forces, moments = _outward(data, sin, cos, qd, qdd)
     torque: list[Number] = [qd[0] * 0.0] * data.n
     for i in reversed(range(data.n)):
         axis = vector(data.axis[i])

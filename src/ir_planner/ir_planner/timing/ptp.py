@@ -31,17 +31,17 @@ _SPEEDS = np.array([1.0, 0.93, 0.86, 0.78, 0.7, 0.6, 0.5, 0.4, 0.28, 0.15])
 _REFINED = np.array([-0.045, -0.03, -0.015, 0.0, 0.015, 0.03, 0.045])
 _HALVINGS = 7
 _PER_PHASE = 7
+_PER_SEGMENT = 9
 
 
-def torque_per_segment(
-    trajectory: JointTrajectory, dynamics: Dynamics, samples: int = 9
-) -> FloatArray:
+def torque_per_segment(trajectory: JointTrajectory, dynamics: Dynamics) -> FloatArray:
     """Largest sampled use of the torque envelope in each segment, (S, n); no proof."""
     _, durations = trajectory.coefficients()
-    t = (trajectory.times[:-1, None] + durations[:, None] * np.linspace(0.0, 1.0, samples)).ravel()
-    motion = trajectory.sample(t)
+    shares = np.linspace(0.0, 1.0, _PER_SEGMENT)
+    t = trajectory.times[:-1, None] + durations[:, None] * shares
+    motion = trajectory.sample(t.ravel())
     use = torque_use(dynamics, motion.q, motion.qd, motion.qdd)
-    return np.asarray(use.reshape(len(durations), samples, -1).max(axis=1))
+    return np.asarray(use.reshape(len(durations), _PER_SEGMENT, -1).max(axis=1))
 
 
 def _law_samples(steps: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:

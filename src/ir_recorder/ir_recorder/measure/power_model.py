@@ -43,14 +43,14 @@ def bus_flow(
     wanted: FloatArray,
     step: float,
     slopes: FloatArray | None = None,
-    charge: float = 0.0,
     softness: float = 0.0,
     size: float = 1.0,
     by_size: FloatArray | None = None,
 ) -> BusFlow:
-    """Run the link over N steps of `step` [s] in which the axes together want `wanted` (N,) W.
+    """Run the link, empty at first, over N steps of `step` [s] in which the axes together want
+    `wanted` (N,) W.
 
-    slopes (N, P): derivatives of `wanted` by parameters. charge [J]: at the start.
+    slopes (N, P): derivatives of `wanted` by parameters.
     softness [J]: over which rectifier and chopper begin to conduct; 0: at once.
     size: times the joules that the link's data give it; by_size (P,): its own derivatives.
     """
@@ -58,17 +58,15 @@ def bus_flow(
     tangents = np.zeros((len(wanted), 0)) if slopes is None else slopes
     by_top = given * (np.zeros(tangents.shape[1]) if by_size is None else by_size)
     if softness > 0.0:
-        return _soft_flow((size * given, by_top), wanted, step, tangents, charge, softness)
-    return _hard_flow((size * given, by_top), wanted, step, tangents, charge)
+        return _soft_flow((size * given, by_top), wanted, step, tangents, softness)
+    return _hard_flow((size * given, by_top), wanted, step, tangents)
 
 
 Top = tuple[float, FloatArray]
 """Joules that the link holds at most, and their derivatives (P,)."""
 
 
-def _hard_flow(
-    limit: Top, wanted: FloatArray, step: float, tangents: FloatArray, charge: float
-) -> BusFlow:
+def _hard_flow(limit: Top, wanted: FloatArray, step: float, tangents: FloatArray) -> BusFlow:
     """With switches that conduct at once.
 
     What the rectifier gives is what was wanted since the link was empty or full for the last time,
@@ -78,6 +76,7 @@ def _hard_flow(
     given = np.zeros(len(wanted))
     held = np.empty(len(wanted))
     since = np.zeros(len(wanted), int)  # the first step that is counted
+    charge = 0.0
     begin = 0
     was_full = np.zeros(len(wanted), bool)
     full = False
@@ -108,12 +107,7 @@ def _hard_flow(
 
 
 def _soft_flow(
-    limit: Top,
-    wanted: FloatArray,
-    step: float,
-    tangents: FloatArray,
-    charge: float,
-    softness: float,
+    limit: Top, wanted: FloatArray, step: float, tangents: FloatArray, softness: float
 ) -> BusFlow:
     """The same with switches that conduct more and more: given = S ln(1 + exp(-rest / S)), S the
     softness.
@@ -123,6 +117,7 @@ def _soft_flow(
     from scipy.linalg import solve_banded
 
     top, by_top = limit
+    charge = 0.0
     given, held, conducts, passes, loses = np.empty((5, len(wanted)))
     for k, joules in enumerate((wanted * step).tolist()):
         rest = charge - joules

@@ -144,11 +144,9 @@ BANDWIDTH = 16.0  # Hz: above what a loaded arm does, below the rounding of enco
 _DEGREE = 4
 
 
-def half_width(rate: float, bandwidth: float = BANDWIDTH) -> int:
-    """Neighbours on each side for a cut-off of `bandwidth` [Hz] (3 dB) at `rate` [Hz]; at least
-    3.
-    """
-    return max(3, math.ceil(((_DEGREE + 1) * rate / (2.0 * bandwidth) + 4.6) / 3.2))
+def half_width(rate: float) -> int:
+    """Neighbours on each side for a cut-off of BANDWIDTH (3 dB) at `rate` [Hz]; at least 3."""
+    return max(3, math.ceil(((_DEGREE + 1) * rate / (2.0 * BANDWIDTH) + 4.6) / 3.2))
 
 
 def kernels(width: int, step: float) -> FloatArray:
@@ -162,12 +160,12 @@ def kernels(width: int, step: float) -> FloatArray:
     return np.asarray(weights * np.array([[1.0], [1.0 / scale], [2.0 / scale**2]]))
 
 
-def differentiated(values: FloatArray, step: float, bandwidth: float = BANDWIDTH) -> FloatArray:
+def differentiated(values: FloatArray, step: float) -> FloatArray:
     """Value, speed and acceleration (3, N, n) of positions (N, n) on a grid of `step` [s].
 
     At both ends the robot counts as at rest there.
     """
-    width = half_width(1.0 / step, bandwidth)
+    width = half_width(1.0 / step)
     padded = np.pad(values, ((width, width), (0, 0)), mode="edge")
     found = np.empty((3, *values.shape))
     for order, weights in enumerate(kernels(width, step)):
@@ -195,7 +193,6 @@ def samples_of(
     joint_names: Sequence[str],
     modes: Sequence[str],
     loads: LoadRuns,
-    step: float = STEP,
 ) -> Samples:
     """Samples over the time of both traces. `modes`: names in their order; without a column of
     modes the motors count as on. RecorderError where there is nothing to sample.
@@ -210,13 +207,13 @@ def samples_of(
     if meter is not None:
         first = max(first, meter.time[0])
         last = min(last, meter.time[-1])
-    count = int((last - first) / step)
+    count = int((last - first) / STEP)
     if not 2 <= count <= MOST_SAMPLES:
         raise RecorderError(
             f"{joints.source}: {max(last - first, 0.0):g} s of positions and power together, "
-            f"must be {2 * step:g} to {MOST_SAMPLES * step:g} s"
+            f"must be {2 * STEP:g} to {MOST_SAMPLES * STEP:g} s"
         )
-    edges = first + step * np.arange(count + 1)
+    edges = first + STEP * np.arange(count + 1)
     middles = 0.5 * (edges[1:] + edges[:-1])
     q, qd, qdd = _motion(joints, positions, middles)
     mode, motors = _modes(
@@ -235,10 +232,10 @@ def samples_of(
             watts[(edges[1:] > start) & (edges[:-1] < start + length)] = np.nan
     effort, currents = _effort(joints, joint_names, edges)
     readings = None
-    if meter is not None and energy is not None and np.median(np.diff(meter.time)) > _SELDOM * step:
+    if meter is not None and energy is not None and np.median(np.diff(meter.time)) > _SELDOM * STEP:
         readings = meter.time
     return Samples(
-        step, middles, q, qd, qdd, mode, load, motors, watts, held, effort, currents, readings
+        STEP, middles, q, qd, qdd, mode, load, motors, watts, held, effort, currents, readings
     )
 
 
@@ -269,12 +266,12 @@ def _effort(
 
 
 def planned_samples(
-    trajectory: JointTrajectory, loads: Sequence[Load], modes: Sequence[str], step: float = STEP
+    trajectory: JointTrajectory, loads: Sequence[Load], modes: Sequence[str]
 ) -> Samples:
     """What a trajectory asks for with motors on, without a meter; the last step may reach beyond
     its end.
     """
-    count = max(int(np.ceil((trajectory.duration - trajectory.times[0]) / step - 1e-9)), 1)
+    count = max(int(np.ceil((trajectory.duration - trajectory.times[0]) / STEP - 1e-9)), 1)
     step = float((trajectory.duration - trajectory.times[0]) / count)
     middles = trajectory.times[0] + (np.arange(count) + 0.5) * step
     at = trajectory.sample(middles)
