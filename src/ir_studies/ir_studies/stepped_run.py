@@ -237,8 +237,8 @@ class RobotRun(SteppedRun):
     in `times`, `postures` and `joules`.
     """
 
-    def __init__(self, cell: Cell, plant: str, turns: _Turns, number: int) -> None:
-        super().__init__(cell, plant, before_step=self._take_turn)
+    def __init__(self, cell: Cell, turns: _Turns, number: int) -> None:
+        super().__init__(cell, before_step=self._take_turn)
         self.times: list[float] = []
         self.postures: list[FloatArray] = []
         self.joules: list[float] = []
@@ -274,7 +274,6 @@ def driven_robots(
     cells: Mapping[str, Cell],
     programs: Mapping[str, Sequence[PlannedMovement]],
     *,
-    plant: str = "nominal",
     late: Mapping[str, float] | None = None,
     signal_timeout: float = 60.0,
 ) -> dict[str, RobotRun]:
@@ -282,7 +281,7 @@ def driven_robots(
     heard by all. late [s]: how much later robots begin. StudyError where a program doesn't end.
     """
     turns = _Turns(len(cells))
-    runs = {robot: RobotRun(cell, plant, turns, k) for k, (robot, cell) in enumerate(cells.items())}
+    runs = {robot: RobotRun(cell, turns, k) for k, (robot, cell) in enumerate(cells.items())}
     threads = []
     for robot, run in runs.items():
         first = next(step for step in programs[robot] if step.trajectory is not None)
