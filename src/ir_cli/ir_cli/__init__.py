@@ -8,7 +8,3 @@ import os
 # NumPy's libraries read this when they are loaded.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
-
-from ir_cli.errors import CommandError  # noqa: E402
-
-__all__ = ["CommandError"]
