@@ -5,7 +5,6 @@ from __future__ import annotations
 import random
 import socket
 import sys
-from types import TracebackType
 
 UDP = socket.SOCK_DGRAM
 TCP = socket.SOCK_STREAM
@@ -44,12 +43,7 @@ class PortClaims:
     def __enter__(self) -> PortClaims:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exception: object) -> None:
         for held in self._held:
             held.close()
         self._held.clear()

@@ -45,17 +45,15 @@ _KEYS = (
     "load_self_capsules",
 )
 _OPTIONAL = ("title", "controller", "counterbalance")
-_JOINT_KEYS = (
-    "names",
-    "origin_m",
-    "axis",
+LIMIT_KEYS = (
     "position_min_deg",
     "position_max_deg",
     "velocity_deg_s",
     "acceleration_rad_s2",
     "jerk_deg_s3",
 )
-_DRIVE_KEYS = (
+_JOINT_KEYS = ("names", "origin_m", "axis", *LIMIT_KEYS)
+DRIVE_KEYS = (
     "gear_ratio",
     "gear_peak_torque_nm",
     "motor_peak_torque_nm",
@@ -65,7 +63,7 @@ _DRIVE_KEYS = (
     "copper_loss_w_per_nm2",
     "envelope_rad_s_nm",
 )
-_COUPLING = "wrist_coupling"  # of drives, where there is any
+COUPLING = "wrist_coupling"  # of drives, where there is any
 
 
 def robot_from_yaml(text: str, source: str = "<text>", folder: Path | None = None) -> RobotModel:
@@ -139,7 +137,7 @@ def _robot(root: Item) -> RobotModel:
     joints = top["joints"].table(_JOINT_KEYS, ("rotation_abc_deg",))
     joint_names = tuple(item.name() for item in joints["names"].list(1, 16))
     n = len(joint_names)
-    drives = top["drives"].table(_DRIVE_KEYS, (_COUPLING,))
+    drives = top["drives"].table(DRIVE_KEYS, (COUPLING,))
     links = [_link(item) for item in top["links"].list(n + 1, n + 1)]
     link_names = tuple(name for name, *_ in links)
     capsules = tuple(_capsule(item, link_names) for item in top["capsules"].list(0, 200))
@@ -187,14 +185,14 @@ def _read_joints(top: Table) -> None:
     n = len(joints["names"].list(1, 16))
     _origins(joints, n)
     figure(joints["axis"]).rows(3, -1, 1, count=(n, n))
-    for key in _JOINT_KEYS[3:]:
+    for key in LIMIT_KEYS:
         _joint_values(joints, key, n, -3600)
 
 
 def _read_drives(top: Table) -> None:
-    drives = top["drives"].table(_DRIVE_KEYS, (_COUPLING,))
+    drives = top["drives"].table(DRIVE_KEYS, (COUPLING,))
     n = len(figure(drives["gear_ratio"]).list(1, 16))
-    for key in _DRIVE_KEYS[:-1]:
+    for key in DRIVE_KEYS[:-1]:
         _joint_values(drives, key, n)
     _envelope(drives, n, _joint_values(drives, "gear_ratio", n))
     _motor_turns(drives, n)
@@ -229,9 +227,9 @@ def _joint_values(table: Table, key: str, n: int, low: float = 0.0) -> FloatArra
 def _motor_turns(drives: Table, n: int) -> FloatArray:
     """What a radian of each joint turns each motor (n, n), by rows of motor, joint and share."""
     turns = np.eye(n)
-    if _COUPLING not in drives:
+    if COUPLING not in drives:
         return turns
-    value = figure(drives[_COUPLING])
+    value = figure(drives[COUPLING])
     for motor, joint, share in value.rows(3, -10.0, 16.0, count=(1, n)):
         if motor not in range(1, n + 1) or joint not in range(1, n + 1) or motor == joint:
             value.fail(

@@ -17,7 +17,7 @@ from dataclasses import asdict, dataclass, field
 from importlib import import_module
 from itertools import islice
 from queue import Empty, Queue
-from types import ModuleType, TracebackType
+from types import ModuleType
 from typing import Any
 from uuid import uuid4
 
@@ -274,12 +274,7 @@ class Cluster:
     def __enter__(self) -> Cluster:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exception: object) -> None:
         if self._client.status == "running":
             _act_at_most(
                 _LEAVE_S, lambda: self._client.run(end_study, self._study, on_error="ignore")

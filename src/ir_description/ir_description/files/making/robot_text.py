@@ -14,7 +14,7 @@ import numpy as np
 from ir_description.files.making.estimates import WORTH, peak_torques, usual_speeds
 from ir_description.files.making.urdf_arm import AXES, ArmLink, UrdfArm
 from ir_description.files.power_file import figure
-from ir_description.files.robot_file import FORMAT
+from ir_description.files.robot_file import COUPLING, DRIVE_KEYS, FORMAT, LIMIT_KEYS
 from ir_description.poses import abc_from_rotation
 from ir_description.robot import ReducedDistance
 from ir_description.shapes import Capsule
@@ -318,23 +318,6 @@ def _with_doubts(links: Sequence[ArmLink]) -> str:
 
 _DIGITS = 11  # significant ones: more than any figure has, fewer than rounding spoils
 _ALL_DIGITS = 17  # of an axis, whose length must be 1 to 1e-12
-_JOINT_ROWS = (
-    "position_min_deg",
-    "position_max_deg",
-    "velocity_deg_s",
-    "acceleration_rad_s2",
-    "jerk_deg_s3",
-)
-_DRIVE_ROWS = (
-    "gear_ratio",
-    "gear_peak_torque_nm",
-    "motor_peak_torque_nm",
-    "reflected_inertia_kgm2",
-    "friction_viscous_nms_rad",
-    "friction_coulomb_nm",
-    "copper_loss_w_per_nm2",
-    "envelope_rad_s_nm",
-)
 
 
 def robot_text(
@@ -379,9 +362,9 @@ def _lines(
             f"{_figure(Value(angles, 'URDF', 'H', 'x of the flange points out'))}"
         )
     yield f"  axis: {_figure(Value(arm.axis, 'URDF', 'H'), _ALL_DIGITS)}"
-    yield from (f"  {key}: {_figure(sheet.values[key])}" for key in _JOINT_ROWS)
+    yield from (f"  {key}: {_figure(sheet.values[key])}" for key in LIMIT_KEYS)
     yield "drives:"
-    rows = [*_DRIVE_ROWS, *(["wrist_coupling"] if "wrist_coupling" in sheet.values else [])]
+    rows = [*DRIVE_KEYS, *([COUPLING] if COUPLING in sheet.values else [])]
     yield from (f"  {key}: {_figure(sheet.values[key])}" for key in rows)
     yield "links:"
     for name, link in zip(links, arm.links, strict=True):
