@@ -27,12 +27,11 @@ from ir_cli.planning import (
     add_options,
     add_parameters,
     add_start,
-    check_stations,
+    asked_program,
     mains_counted,
     options_of,
     planner_of,
     sentences,
-    start_of,
     supply,
 )
 from ir_cli.trace_programs import today_of_trace
@@ -153,9 +152,7 @@ def _found(arguments: argparse.Namespace, planner: Planner, line: ProgressLine) 
     process = _process(arguments.process)
     endings = {KRL[0] if is_project(path) else path.suffix.lower() for path in arguments.today}
     if not endings:
-        stations: Sequence[str] = arguments.stations
-        check_stations(stations, planner)
-        start = start_of(arguments.start, planner, stations, arguments.safety_distance)
+        stations, start = asked_program(arguments, planner)
         return before_after_common(
             planner, stations, start, arguments.cycle_time, options, line.show
         )

@@ -28,12 +28,11 @@ from ir_cli.planning import (
     add_options,
     add_parameters,
     add_start,
-    check_stations,
     failed,
     options_of,
+    planned_program,
     planner_of,
     sentences,
-    start_of,
 )
 from ir_krl import Followed, parse, read_project
 from ir_krl.language import SourceFile
@@ -294,18 +293,8 @@ def run_export(arguments: argparse.Namespace) -> int:
     with sentences(), ProgressLine() as line:
         asked = _frame_numbers(arguments)
         planner = planner_of(arguments.cell, arguments.power_parameters)
-        stations = tuple(arguments.stations)
-        check_stations(stations, planner)
-        start = start_of(arguments.start, planner, stations, arguments.safety_distance)
         options = options_of(arguments)
-        plan = planner.plan_program(
-            stations=stations,
-            cycle_time=arguments.cycle_time,
-            blend=arguments.blend,
-            options=options,
-            start=start,
-            progress=line.show,
-        )
+        plan = planned_program(arguments, planner, options, line.show)
         if not plan.status.ok:
             return failed(plan.status.message)
         written = export_krl(planner, plan.movements, source.stem, options, style, asked)

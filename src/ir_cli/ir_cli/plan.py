@@ -29,14 +29,13 @@ from ir_cli.planning import (
     add_options,
     add_parameters,
     add_start,
-    check_stations,
     clock,
     failed,
     options_of,
+    planned_program,
     planner_of,
     predicted,
     sentences,
-    start_of,
     supply,
 )
 from ir_cli.robots_plan import robots_of, run_robots
@@ -121,19 +120,8 @@ def run_plan(arguments: argparse.Namespace) -> int:
     _check_steady_options(arguments)
     with sentences(), ProgressLine() as line:
         planner = _planner(arguments)
-        stations = tuple(arguments.stations)
-        check_stations(stations, planner)
-        start = start_of(arguments.start, planner, stations, arguments.safety_distance)
         options = options_of(arguments)
-        plan = planner.plan_program(
-            stations=stations,
-            cycle_time=arguments.cycle_time,
-            blend=arguments.blend,
-            options=options,
-            start=start,
-            progress=line.show,
-            savings=arguments.saving,
-        )
+        plan = planned_program(arguments, planner, options, line.show, savings=arguments.saving)
     for page in (each for each in arguments.output if each.suffix == ".html"):
         _page(page, arguments, plan, planner, options)
     notes = (*assumed_doors(planner.cell), *_near_by_construction(planner))

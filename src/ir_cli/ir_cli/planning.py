@@ -9,7 +9,7 @@ import argparse
 import math
 import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TypedDict
@@ -22,8 +22,8 @@ from ir_msgs_py.options import NO_TILT, OBJECTIVES, ROBOTS_TIME_VALUE, PlanOptio
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.savings import one_sided
 from ir_msgs_py.status import StatusCode
-from ir_planner import Goal, Planner, PlannerSettings, RequestError, parse_goal
-from ir_planner.program import AS_THE_CELL_SAYS
+from ir_planner import Goal, Planner, PlannerSettings, ProgramPlan, RequestError, parse_goal
+from ir_planner.program import AS_THE_CELL_SAYS, Progress
 from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError
 
@@ -139,9 +139,37 @@ def add_blend(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def start_of(text: str, planner: Planner, stations: Sequence[str], margin: float) -> FloatArray:
-    """Joint values (n,) rad where the program, or a visit of stations, begins."""
-    return configuration_of(text or planner.cell.cycle_start(stations), planner, margin)
+def asked_program(
+    arguments: argparse.Namespace, planner: Planner
+) -> tuple[tuple[str, ...], FloatArray]:
+    """Stations that a command asks for, (): the cell's program, and the joint values (n,) rad where
+    it begins.
+    """
+    stations = tuple(arguments.stations)
+    check_stations(stations, planner)
+    start = arguments.start or planner.cell.cycle_start(stations)
+    return stations, configuration_of(start, planner, arguments.safety_distance)
+
+
+def planned_program(
+    arguments: argparse.Namespace,
+    planner: Planner,
+    options: PlanOptions,
+    progress: Progress,
+    *,
+    savings: bool = False,
+) -> ProgramPlan:
+    """The program that a command asks for, as planned."""
+    stations, start = asked_program(arguments, planner)
+    return planner.plan_program(
+        stations=stations,
+        cycle_time=arguments.cycle_time,
+        blend=arguments.blend,
+        options=options,
+        start=start,
+        progress=progress,
+        savings=savings,
+    )
 
 
 def add_cell(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
