@@ -212,28 +212,35 @@ def _frozen(name: str, value: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
 def lump(
     mass: float, com: FloatArray, inertia: FloatArray, loads: Sequence[LoadLike]
 ) -> tuple[float, FloatArray, FloatArray]:
-    """Mass, centre of mass (3,) and inertia (3, 3) about it of a link with loads bolted on.
+    """Mass [kg], centre of mass (3,) [m] and inertia (3, 3) [kg m^2] about it of a link with loads
+    bolted on.
 
     com (3,) and inertia (3, 3) are the link's own; parallel axis theorem. Raises KernelError for a
     load whose mass is negative or not finite.
     """
-    masses = [float(mass), *(float(load.mass) for load in loads)]
-    centres = [np.asarray(com, float), *(np.asarray(load.com, float) for load in loads)]
-    inertias = [np.asarray(inertia, float), *(np.asarray(load.inertia, float) for load in loads)]
-    for load, own in zip(loads, masses[1:], strict=True):
+    masses = [float(mass)]
+    centres = [np.asarray(com, float)]
+    inertias = [np.asarray(inertia, float)]
+    for load in loads:
+        own = float(load.mass)
         if not (np.isfinite(own) and own >= 0.0):
             raise KernelError(
                 f"load {load.name!r} has a mass of {own} kg: it has to be finite and not negative"
             )
+        masses.append(own)
+        centres.append(np.asarray(load.com, float))
+        inertias.append(np.asarray(load.inertia, float))
     total = sum(masses)
     if total == 0.0:
         return 0.0, centres[0], inertias[0]
-    centre = np.asarray(sum(m * c for m, c in zip(masses, centres, strict=True)) / total)
+    moments = [m * centre for m, centre in zip(masses, centres, strict=True)]
+    common = np.asarray(sum(moments) / total)
     lumped = np.zeros((3, 3))
-    for m, c, own_inertia in zip(masses, centres, inertias, strict=True):
-        d = c - centre
-        lumped += own_inertia + m * (portable.matmul(d, d) * np.eye(3) - np.outer(d, d))
-    return total, centre, lumped
+    for m, centre, about_centre in zip(masses, centres, inertias, strict=True):
+        d = centre - common
+        steiner = portable.matmul(d, d) * np.eye(3) - np.outer(d, d)
+        lumped += about_centre + m * steiner
+    return total, common, lumped
 
 
 def _counterbalance(data: CounterbalanceLike | None) -> CounterbalanceData | None:

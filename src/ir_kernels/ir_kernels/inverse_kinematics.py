@@ -98,6 +98,10 @@ class ThreeParallelIk:
     ) -> tuple[FloatArray, BoolArray]:
         """q (N, 6) of one elbow, and whether it is in reach; where the arm is stretched both are
         the same.
+
+        X (N, 4, 4): displacements of the hand. total (N,): sum of the angles of the three parallel
+        axes. other: the second elbow. Upper arm and forearm are two bars in the plane across the
+        parallel axes: the law of cosines gives the bend between them.
         """
         lines = self.lines
         z = lines.z
@@ -113,22 +117,34 @@ class ThreeParallelIk:
             y = portable.matmul(vector, across)
             return x, y, portable.hypot(x, y)
 
-        upper_x, upper_y, a = planar(o[2] - o[1])
-        fore_x, fore_y, b = planar(o[3] - o[2])
+        upper_x, upper_y, upper = planar(o[2] - o[1])
+        fore_x, fore_y, fore = planar(o[3] - o[2])
         aim_x, aim_y, distance = planar(target)
-        cosine = (distance * distance - a * a - b * b) / (2.0 * a * b)
-        bend = portable.arccos(np.clip(cosine, -1.0, 1.0)) * (-1.0 if other else 1.0)
-        opening = (upper_x * fore_y - upper_y * fore_x, upper_x * fore_x + upper_y * fore_y)
-        turn = bend - portable.arctan2(*opening)
+        cosine = (distance * distance - upper * upper - fore * fore) / (2.0 * upper * fore)
+        side = -1.0 if other else 1.0
+        bend = portable.arccos(np.clip(cosine, -1.0, 1.0)) * side
+
+        # q3 is the bend, less the angle between the two bars at q = 0
+        opening_sine = upper_x * fore_y - upper_y * fore_x
+        opening_cosine = upper_x * fore_x + upper_y * fore_y
+        turn = bend - portable.arctan2(opening_sine, opening_cosine)
         cos = portable.cos(turn)
         sin = portable.sin(turn)
+
+        # q2 turns the bent arm onto the target
         arm_x = upper_x + fore_x * cos - fore_y * sin
         arm_y = upper_y + fore_x * sin + fore_y * cos
-        q2 = portable.arctan2(aim_y * arm_x - aim_x * arm_y, aim_x * arm_x + aim_y * arm_y)
-        reached = (distance <= a + b + STRETCHED) & (distance >= abs(a - b) - STRETCHED)
-        twice = other & (np.abs(cosine) >= 1.0)
+        aim_sine = aim_y * arm_x - aim_x * arm_y
+        aim_cosine = aim_x * arm_x + aim_y * arm_y
+        q2 = portable.arctan2(aim_sine, aim_cosine)
+        q3 = lines.parallel(2) * turn
         q4 = lines.parallel(3) * (total - q2 - turn)
-        return np.stack([q1, q2, lines.parallel(2) * turn, q4, q5, q6], axis=1), reached & ~twice
+
+        longest = upper + fore + STRETCHED
+        shortest = abs(upper - fore) - STRETCHED
+        reached = (distance <= longest) & (distance >= shortest)
+        stretched = np.abs(cosine) >= 1.0
+        return np.stack([q1, q2, q3, q4, q5, q6], axis=1), reached & ~(other & stretched)
 
 
 def displacements(chain: Chain, lines: ArmLines, targets: FloatArray) -> FloatArray:
@@ -256,56 +272,64 @@ class SearchedIk:
         return _distinct(pose[exact], best[exact])
 
     def _guesses(self, targets: FloatArray, grid: int) -> tuple[IntArray, FloatArray]:
-        """Where Newton's steps start: poses (M,) and q (M, 6), on the grid, and on finer ones
-        beside values of q4 where a solution is near, a branch ends, or one may lie between two
-        values.
+        """Where Newton's steps start for targets (N, 4, 4): poses (M,) and q (M, 6), on the grid,
+        and on finer ones beside values of q4 where a solution is near, a branch ends, or one may
+        lie between two values.
         """
         step = 2.0 * np.pi / grid
-        found = []
-        q4 = np.tile(np.linspace(-np.pi, np.pi, grid, endpoint=False), (len(targets), 1))
+        poses = []
+        starts = []
+        even = np.linspace(-np.pi, np.pi, grid, endpoint=False)
+        q4 = np.tile(even, (len(targets), 1))
+        X_of_targets = displacements(self.chain, self.lines, targets)
         for level in range(_LEVELS):
             count = q4.shape[1]
-            X = np.repeat(displacements(self.chain, self.lines, targets), count, axis=0)
-            q, lack, beyond = self._candidates(X, self.lines.turned(3, q4.ravel()), q4.ravel())
-            marked = _starts(lack.reshape(len(targets), count, -1))
-            pose, k, branch = np.nonzero(marked)
-            found.append((pose, q.reshape(len(targets), count, -1, 6)[pose, k, branch]))
-            narrow = _narrow(beyond.reshape(len(targets), count, -1).min(axis=2))
-            rows = narrow | marked.any(axis=2) if level == 0 else narrow
-            if not rows.any():
+            shape = (len(targets), count, -1)
+            every_q4 = q4.ravel()
+            X = np.repeat(X_of_targets, count, axis=0)
+            q, miss, beyond = self._candidates(X, self.lines.turned(3, every_q4), every_q4)
+            is_start = _starts(miss.reshape(shape))
+            pose, k, branch = np.nonzero(is_start)
+            poses.append(pose)
+            starts.append(q.reshape(*shape, 6)[pose, k, branch])
+            refined = _narrow(beyond.reshape(shape).min(axis=2))
+            if level == 0:
+                refined = refined | is_start.any(axis=2)
+            if not refined.any():
                 break
-            q4 = _finer(q4, rows, step)
+            q4 = _finer(q4, refined, step)
             step /= _PARTS
-        poses, starts = zip(*found, strict=True)
         return np.concatenate(poses), np.concatenate(starts)
 
     def _candidates(
         self, X: FloatArray, E4: FloatArray, q4: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """q (N, 4, 6), by how much axis 3 misses its place [m] (N, 4), inf where there is nothing,
-        how far beyond a tangent q1 or q5 is (N, 4).
+        """For displacements (N, 4, 4) of the hand and of axis 4, and q4 (N,) rad: q (N, 4, 6), by
+        how much axis 3 misses its place [m] (N, 4), inf where there is nothing, how far beyond a
+        tangent q1 or q5 is (N, 4).
         """
         lines = self.lines
-        q1, q5, exists, beyond = shoulder_and_wrist(lines, X, E4, SLACK)
-        rows = []
-        lacks = []
-        upper = lines.o[2] - lines.o[1]
-        z = lines.z
+        z2 = lines.z[1]
         turned = lines.turned
-        length = portable.norm(upper - (portable.matmul(upper, z[1])) * z[1])
+        q1s, q5s, exists, beyond = shoulder_and_wrist(lines, X, E4, SLACK)
+        upper = lines.o[2] - lines.o[1]
+        length = portable.norm(upper - portable.matmul(upper, z2) * z2)
+        configurations = []
+        misses = []
         for pair in range(4):
-            q6, total, _ = wrist_and_sum(lines, X, E4, q1[:, pair], q5[:, pair], 0.0)
-            back = portable.matmul(
-                turned(0, -q1[:, pair]), X, turned(5, -q6), turned(4, -q5[:, pair])
-            )
+            q1 = q1s[:, pair]
+            q5 = q5s[:, pair]
+            q6, total, _ = wrist_and_sum(lines, X, E4, q1, q5, 0.0)
+            back = portable.matmul(turned(0, -q1), X, turned(5, -q6), turned(4, -q5))
             back = portable.matmul(back, turned(3, -q4))  # = E2 E3
             elbow = portable.matmul(back[:, :3, :3], lines.o[2]) + back[:, :3, 3] - lines.o[1]
-            q2 = angle_about(z[1], np.broadcast_to(upper, elbow.shape), elbow)
+            q2 = angle_about(z2, np.broadcast_to(upper, elbow.shape), elbow)
             q3 = lines.parallel(2) * (total - q2)
-            rows.append(np.stack([q1[:, pair], q2, q3, q4, q5[:, pair], q6], axis=1))
-            apart = np.linalg.norm(elbow - (portable.matmul(elbow, z[1]))[:, None] * z[1], axis=1)
-            lacks.append(np.where(exists[:, pair], apart - length, np.inf))
-        return np.stack(rows, axis=1), np.stack(lacks, axis=1), beyond
+            configurations.append(np.stack([q1, q2, q3, q4, q5, q6], axis=1))
+            across = elbow - portable.matmul(elbow, z2)[:, None] * z2
+            apart = np.linalg.norm(across, axis=1)
+            misses.append(np.where(exists[:, pair], apart - length, np.inf))
+        return np.stack(configurations, axis=1), np.stack(misses, axis=1), beyond
 
 
 def _starts(lack: FloatArray) -> BoolArray:
@@ -387,17 +411,23 @@ class RailIk:
         position_max: ArrayLike,
         places: ArrayLike | None = None,
     ) -> None:
-        low, high = (np.array(ends, np.float64) for ends in (position_min, position_max))
+        low = np.array(position_min, np.float64)
+        high = np.array(position_max, np.float64)
         if places is None:
             count = int(np.ceil((high[0] - low[0]) / RAIL_STEP)) + 1
-            places = np.linspace(low[0], high[0], min(max(count, 2), RAIL_PLACES))
-        self.places = data.array(np.atleast_1d(np.asarray(places, np.float64)), "places", (None,))
+            count = min(max(count, 2), RAIL_PLACES)
+            places = np.linspace(low[0], high[0], count)
+        listed = np.atleast_1d(np.asarray(places, np.float64))
+        self.places = data.array(listed, "places", (None,))
         if (self.places < low[0]).any() or (self.places > high[0]).any():
             raise KernelError(f"places must be in [{low[0]:g}, {high[0]:g}] m")
         self._along = portable.matmul(chain.joint_origin[0][:3, :3], chain.joint_axis[0])
         self._along = portable.matmul(chain.base_pose[:3, :3], self._along)
+
+        # the arm alone, as it stands with the rail at 0
         standing = portable.matmul(chain.base_pose, chain.joint_origin[0])
-        arm = Chain(_Arm(chain.joint_origin[1:], chain.joint_axis[1:]), standing, chain.tcp)
+        own_joints = _Arm(chain.joint_origin[1:], chain.joint_axis[1:])
+        arm = Chain(own_joints, standing, chain.tcp)
         self._arm = inverse_kinematics(arm, low[1:], high[1:])
 
     def with_places(self, places: ArrayLike) -> "RailIk":

@@ -200,23 +200,35 @@ def interpolating_spline(
     if (np.diff(x) <= 0.0).any() or len(x) != len(y):
         raise ValueError("the places of an interpolating spline must rise, one for each value")
     if degree == 1 and knots is None and ends is None:
-        return BSpline(np.concatenate([x[:1], x, x[-1:]]), y, 1)
+        polyline_knots = np.concatenate([x[:1], x, x[-1:]])
+        return BSpline(polyline_knots, y, 1)
     if knots is None:
-        inner = x[1:-1]
-        if ends is None:
-            half = (degree + 1) // 2 if degree % 2 else degree // 2
-            inner = (x if degree % 2 else 0.5 * (x[1:] + x[:-1]))[half:-half]
+        inner = x[1:-1] if ends is not None else _not_a_knot(x, degree)
         around = np.ones(degree + 1)
         knots = np.concatenate([x[0] * around, inner, x[-1] * around])
-    points = y.reshape(len(y), -1)
-    none = np.zeros((0, points.shape[1]))
-    first, last = (np.reshape(end, (2, -1)) for end in ends) if ends is not None else (none, none)
     if _CORE is None:
         return _interpolated_by_scipy(x, y, degree, knots, ends)
+    points = y.reshape(len(y), -1)
+    first = last = np.zeros((0, points.shape[1]))
+    if ends is not None:
+        first = np.reshape(ends[0], (2, -1))
+        last = np.reshape(ends[1], (2, -1))
     control = _CORE.interpolate(knots, degree, x, points, first, last)
     if control is None:
         raise ValueError("the knots of an interpolating spline don't fit its places")
     return BSpline(knots, control.reshape(-1, *y.shape[1:]), degree)
+
+
+def _not_a_knot(x: FloatArray, degree: int) -> FloatArray:
+    """Inner knots of a spline through places x (N,): the places themselves, of an even degree the
+    middles between them, without as many at each end as the conditions there would need.
+    """
+    if degree % 2:
+        left_out = (degree + 1) // 2
+        return x[left_out:-left_out]
+    left_out = degree // 2
+    middles = 0.5 * (x[1:] + x[:-1])
+    return np.asarray(middles[left_out:-left_out])
 
 
 def _interpolated_by_scipy(

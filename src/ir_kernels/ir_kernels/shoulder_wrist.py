@@ -81,19 +81,26 @@ def shoulder_and_wrist(
     """
     z = lines.z
     o = lines.o
-    seen = portable.matmul(np.swapaxes(E4[:, :3, :3], 1, 2), z[1])  # z2 before axis 4 turned
-    aim1 = _along(z[1], -z[0], portable.matmul(X[:, :3, :3], z[5]))
-    aim5 = _along(seen, z[4], np.broadcast_to(z[5], seen.shape))
-    reach1 = _along(z[1], -z[0], (portable.matmul(X[:, :3, :3], o[5]) + X[:, :3, 3]) - o[0])
+    hand_turn = X[:, :3, :3]
+    z2_before_axis4 = portable.matmul(np.swapaxes(E4[:, :3, :3], 1, 2), z[1])
+
+    # the direction along axis 6, of q1 and of q5
+    aim1 = _along(z[1], -z[0], portable.matmul(hand_turn, z[5]))
+    aim5 = _along(z2_before_axis4, z[4], np.broadcast_to(z[5], z2_before_axis4.shape))
+
+    # the point of axis 6 nearest to axis 5, of q1 and of q5
+    point_of_hand = portable.matmul(hand_turn, o[5]) + X[:, :3, 3]
+    reach1 = _along(z[1], -z[0], point_of_hand - o[0])
     fixed = (
-        portable.matmul(seen, o[4])
+        portable.matmul(z2_before_axis4, o[4])
         + portable.matmul(E4[:, :3, 3], z[1])
         - portable.matmul(z[1], o[0])
     )
-    if lines.meet:
-        q1, reached, far = reach1.angles(fixed, slack)
-        return _one_by_one(q1, reached, far, aim1, aim5, slack)
-    reach5 = _along(seen, z[4], np.broadcast_to(o[5] - o[4], seen.shape))
+    if lines.meet:  # no q5 in the second equation: it gives q1 first
+        q1, reached, beyond = reach1.angles(fixed, slack)
+        return _one_by_one(q1, reached, beyond, aim1, aim5, slack)
+    from_axis5 = np.broadcast_to(o[5] - o[4], z2_before_axis4.shape)
+    reach5 = _along(z2_before_axis4, z[4], from_axis5)
     reach5 = reach5._replace(constant=reach5.constant + fixed)
     return _together(aim1, aim5, reach1, reach5, max(slack, NEAR_UNIT))
 
@@ -117,52 +124,64 @@ def _one_by_one(
 
 
 def _together(aim1: _Sum, aim5: _Sum, reach1: _Sum, reach5: _Sum, slack: float) -> ShoulderPairs:
-    """M x + m = N y with x, y the unit vectors of q1 and q5: |adj(N) (M x + m)| = |det N|, as
+    """Four pairs of q1 and q5 (n, 4) at which both equations hold: aim1(q1) = aim5(q5), of a
+    direction, and reach1(q1) = reach5(q5) [m]. Pairs up to `slack` beyond the unit circle exist.
+
+    M x + m = N y with x, y the unit vectors of q1 and q5: |adj(N) (M x + m)| = |det N|, as
     y = adj(N) (M x + m) / det N has length 1. adj rather than the inverse: det N may be 0.
     """
     N = np.stack([aim5[:2], reach5[:2]]).transpose(2, 0, 1)  # (n, 2, 2)
     scale = np.maximum(np.abs(N).max(axis=2), _NOTHING)  # both rows without a unit
     N = N / scale[:, :, None]
     M = np.stack([aim1[:2], reach1[:2]]).transpose(2, 0, 1) / scale[:, :, None]
-    m = np.stack([aim1.constant - aim5.constant, reach1.constant - reach5.constant], axis=1) / scale
+    of_aim = aim1.constant - aim5.constant
+    of_reach = reach1.constant - reach5.constant
+    m = np.stack([of_aim, of_reach], axis=1) / scale
     det = N[:, 0, 0] * N[:, 1, 1] - N[:, 0, 1] * N[:, 1, 0]
-    adj = np.stack(
-        [np.stack([N[:, 1, 1], -N[:, 0, 1]], 1), np.stack([-N[:, 1, 0], N[:, 0, 0]], 1)], 1
-    )
+    adj_row0 = np.stack([N[:, 1, 1], -N[:, 0, 1]], axis=1)
+    adj_row1 = np.stack([-N[:, 1, 0], N[:, 0, 0]], axis=1)
+    adj = np.stack([adj_row0, adj_row1], axis=1)
     A = portable.matmul(adj, M)
-    a = (portable.matmul(adj, m[:, :, None]))[:, :, 0]
+    a = portable.matmul(adj, m[:, :, None])[:, :, 0]
 
     # q1 from the roots w = exp(i q1); log |w| is how far a root is from the unit circle
     w = _unit_roots(A, a, det)
-    beyond = portable.log(np.sqrt((w * w).sum(axis=2)))
+    length = np.sqrt((w * w).sum(axis=2))
+    off_circle = portable.log(length)
+    is_off = np.abs(off_circle) > NEAR_UNIT
     q1 = portable.arctan2(w[..., 1], w[..., 0])
-    q1 = q1 + np.where(np.abs(beyond) > NEAR_UNIT, beyond, 0.0)  # a pair that just left the circle
+    q1 = q1 + np.where(is_off, off_circle, 0.0)  # a pair that just left the circle
 
     # q5 from y, of which the sign of det N is all that matters
     x = np.stack([portable.cos(q1), portable.sin(q1)], axis=1)  # (n, 2, 4)
     y = (portable.matmul(A, x) + a[:, :, None]) * np.sign(det)[:, None, None]
-    far = np.where(np.abs(beyond) > NEAR_UNIT, np.abs(beyond), 0.0)
-    return ShoulderPairs(q1, portable.arctan2(y[:, 1], y[:, 0]), np.abs(beyond) <= slack, far)
+    q5 = portable.arctan2(y[:, 1], y[:, 0])
+    exists = np.abs(off_circle) <= slack
+    beyond = np.where(is_off, np.abs(off_circle), 0.0)
+    return ShoulderPairs(q1, q5, exists, beyond)
 
 
 def _unit_roots(A: FloatArray, a: FloatArray, det: FloatArray) -> FloatArray:
     """Roots w (n, 4), real and imaginary parts (n, 4, 2), of |A x + a|^2 = det^2 as a polynomial in
-    w = exp(i q1), x = (cos q1, sin q1).
+    w = exp(i q1), x = (cos q1, sin q1); A (n, 2, 2), a (n, 2), det (n,).
     """
-    p = 0.5 * A * np.array([1.0, -1.0])  # A x + a = p w + conj(p) / w + a, p as (n, 2, 2)
+    conjugate = np.array([1.0, -1.0])
+    p = 0.5 * A * conjugate  # A x + a = p w + conj(p) / w + a, p as (n, 2, 2)
     # |p w + a + conj(p) / w|^2 - det^2, times w^2: coefficients of w^4 to w^0, of which the last
     # two are conjugates of the first two
     sizes = (p * p).sum(axis=1)
-    square = np.stack([sizes[:, 0] - sizes[:, 1], 2.0 * (p[:, :, 0] * p[:, :, 1]).sum(axis=1)], 1)
+    square_real = sizes[:, 0] - sizes[:, 1]
+    square_imaginary = 2.0 * (p[:, :, 0] * p[:, :, 1]).sum(axis=1)
+    square = np.stack([square_real, square_imaginary], axis=1)
     mixed = 2.0 * (p * a[:, :, None]).sum(axis=1)
     middle = 2.0 * sizes.sum(axis=1) + (a * a).sum(axis=1) - det * det
     centre = np.stack([middle, np.zeros_like(middle)], axis=1)
-    conjugate = np.array([1.0, -1.0])
     rows = np.stack([square, mixed, centre, mixed * conjugate, square * conjugate], axis=1)
 
     # where the first coefficient vanishes the degree is lower: a tiny one sends a root far away
     lengths = np.sqrt((rows * rows).sum(axis=2))
     size = lengths.max(axis=1)
-    nothing = lengths[:, 0] < 1e-14 * np.maximum(size, 1e-300)
-    rows[nothing, 0] = np.stack([1e-14 * size + 1e-300, np.zeros_like(size)], axis=1)[nothing]
+    vanishes = lengths[:, 0] < 1e-14 * np.maximum(size, 1e-300)
+    tiny = np.stack([1e-14 * size + 1e-300, np.zeros_like(size)], axis=1)
+    rows[vanishes, 0] = tiny[vanishes]
     return portable.roots(rows)

@@ -172,41 +172,56 @@ def meeting(first: SweptArm, second: SweptArm, threshold: float) -> Meeting:
     """
     from ir_kernels.reference.certify import MARGIN, RESOLUTION
 
-    links = (first.capsules.link, second.capsules.link)
-    pairs = np.argwhere((links[0][:, None] > 0) | (links[1][None, :] > 0))
-    a = np.full(len(pairs), first.root)
-    b = np.full(len(pairs), second.root)
-    ca, cb = pairs.T
+    moves_a = first.capsules.link > 0
+    moves_b = second.capsules.link > 0
+    pairs = np.argwhere(moves_a[:, None] | moves_b[None, :])
+    # open rows (N,): a piece of each movement, and a capsule of each arm
+    piece_a = np.full(len(pairs), first.root)
+    piece_b = np.full(len(pairs), second.root)
+    capsule_a, capsule_b = pairs.T
     looked_at = 0
-    while len(a):
-        looked_at += len(a)
-        distance = _distances(first, second, (a, b), (ca, cb))
+    while len(piece_a):
+        looked_at += len(piece_a)
+        distance = _distances(first, second, (piece_a, piece_b), (capsule_a, capsule_b))
         above = distance - threshold
-        moves = first.moved[a, ca], second.moved[b, cb]
-        passed = first.passed(a) & second.passed(b)
-        k = int(np.where(passed, above, np.inf).argmin())
+        moved_a = first.moved[piece_a, capsule_a]
+        moved_b = second.moved[piece_b, capsule_b]
+        moved = moved_a + moved_b
+        unproved = above <= moved + MARGIN
+
+        # a collision needs an instant of each movement: pieces of several segments have none
+        passed = first.passed(piece_a) & second.passed(piece_b)
+        row = int(np.where(passed, above, np.inf).argmin())
         verdict = COLLIDES
-        if not passed[k] or above[k] > -MARGIN:
-            stuck = (above <= moves[0] + moves[1] + MARGIN) & (moves[0] + moves[1] < RESOLUTION)
-            stuck &= passed
-            verdict = UNDECIDED if stuck.any() or len(a) > ROWS_MAX else FREE
-            k = int(stuck.argmax())
+        if not passed[row] or above[row] > -MARGIN:
+            stuck = unproved & (moved < RESOLUTION) & passed
+            too_many = len(piece_a) > ROWS_MAX
+            verdict = UNDECIDED if stuck.any() or too_many else FREE
+            row = int(stuck.argmax())
         if verdict != FREE:
-            times = first.time(int(a[k])), second.time(int(b[k]))
-            names = first.capsules.names[ca[k]], second.capsules.names[cb[k]]
-            return Meeting(verdict, times, names, float(distance[k]), looked_at)
-        open_ = above <= moves[0] + moves[1] + MARGIN
-        by_first = moves[0][open_] >= moves[1][open_]
-        a, b, ca, cb = (each[open_] for each in (a, b, ca, cb))
-        left_a, right_a = first.halves(a[by_first])
-        left_b, right_b = second.halves(b[~by_first])
-        ca = np.concatenate([np.tile(ca[by_first], 2), np.tile(ca[~by_first], 2)])
-        cb = np.concatenate([np.tile(cb[by_first], 2), np.tile(cb[~by_first], 2)])
-        a, b = (
-            np.concatenate([left_a, right_a, np.tile(a[~by_first], 2)]),
-            np.concatenate([np.tile(b[by_first], 2), left_b, right_b]),
-        )
+            times = first.time(int(piece_a[row])), second.time(int(piece_b[row]))
+            name_a = first.capsules.names[capsule_a[row]]
+            name_b = second.capsules.names[capsule_b[row]]
+            return Meeting(verdict, times, (name_a, name_b), float(distance[row]), looked_at)
+
+        # what isn't proved is halved along the movement whose capsule moves farther
+        by_first = moved_a[unproved] >= moved_b[unproved]
+        piece_a = piece_a[unproved]
+        piece_b = piece_b[unproved]
+        left_a, right_a = first.halves(piece_a[by_first])
+        left_b, right_b = second.halves(piece_b[~by_first])
+        piece_a = np.concatenate([left_a, right_a, np.tile(piece_a[~by_first], 2)])
+        piece_b = np.concatenate([np.tile(piece_b[by_first], 2), left_b, right_b])
+        capsule_a = _twice(capsule_a[unproved], by_first)
+        capsule_b = _twice(capsule_b[unproved], by_first)
     return Meeting(FREE, looked_at=looked_at)
+
+
+def _twice(capsules: IntArray, by_first: BoolArray) -> IntArray:
+    """Capsules (N,) of rows that are halved, once for each half: first the rows that are halved
+    along the first movement.
+    """
+    return np.concatenate([np.tile(capsules[by_first], 2), np.tile(capsules[~by_first], 2)])
 
 
 def _distances(

@@ -156,7 +156,10 @@ def wrist_geometry(chain: Chain) -> WristGeometry:
     foot = o[0] + z[0] * (portable.matmul(z[0], o[1] - o[0]))
 
     def planar(vector: FloatArray) -> complex:
-        return complex(portable.matmul(plane[2], vector), portable.matmul(plane[0], vector))
+        """A vector of the arm's plane: along axis 1, and i times what is across."""
+        along = portable.matmul(plane[2], vector)
+        across = portable.matmul(plane[0], vector)
+        return complex(along, across)
 
     for array in (z, plane, foot):
         array.setflags(write=False)
@@ -168,6 +171,11 @@ def wrist_geometry(chain: Chain) -> WristGeometry:
             f"chain: upper arm of {abs(upper_arm):.3g} m or forearm of {abs(forearm):.3g} m "
             "vanishes"
         )
+
+    # how far axis 6 is turned out of axis 4 about axis 5, where all joints are at 0
+    sine = portable.matmul(z[4], np.cross(z[3], z[5]))
+    cosine = portable.matmul(z[3], z[5])
+    hand = frames[5]
     return WristGeometry(
         axis=z,
         plane=plane,
@@ -178,11 +186,7 @@ def wrist_geometry(chain: Chain) -> WristGeometry:
         upper_arm=upper_arm,
         forearm=forearm,
         elbow_sign=float(np.sign(portable.matmul(z[1], z[2]))),
-        wrist_zero=float(
-            portable.arctan2(
-                portable.matmul(z[4], np.cross(z[3], z[5])), portable.matmul(z[3], z[5])
-            )
-        ),
-        hand=frames[5],
-        wrist_in_hand=portable.matmul(frames[5, :3, :3].T, centre - frames[5, :3, 3]),
+        wrist_zero=float(portable.arctan2(sine, cosine)),
+        hand=hand,
+        wrist_in_hand=portable.matmul(hand[:3, :3].T, centre - hand[:3, 3]),
     )

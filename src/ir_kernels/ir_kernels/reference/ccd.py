@@ -122,7 +122,10 @@ def best_value(
 
 
 def sweep(problem: Problem, q: FloatArray) -> FloatArray:
-    """One pass over the joints, from the tool to the base (P, n)."""
+    """One pass over the joints, from the tool to the base: new configurations (P, n) of q (P, n).
+
+    Each joint takes the value of least cost while all others stay (eqs. 1 to 6).
+    """
     q = q.copy()
     links = link_poses(problem.joint_origin, problem.joint_axis, problem.base_pose, q)
     origin, direction = axes(problem.joint_axis, links)
@@ -132,10 +135,12 @@ def sweep(problem: Problem, q: FloatArray) -> FloatArray:
         low = float(problem.position_min[i])
         high = float(problem.position_max[i])
         value = best_value(q[:, i], k1, k2, k3, low, high)
+        change = value - q[:, i]
         for p in range(len(q)):  # the joints inside of i stay: only the tool turns about axis i
-            turn = axis_rotation(direction[p, i], (value - q[:, i])[p : p + 1])[0]
+            turn = axis_rotation(direction[p, i], change[p : p + 1])[0]
+            from_axis = pose[p, :3, 3] - origin[p, i]
             pose[p, :3, :3] = portable.matmul(turn, pose[p, :3, :3])
-            pose[p, :3, 3] = origin[p, i] + portable.matmul(turn, pose[p, :3, 3] - origin[p, i])
+            pose[p, :3, 3] = origin[p, i] + portable.matmul(turn, from_axis)
         q[:, i] = value
     return q
 

@@ -228,7 +228,11 @@ class _Earliest:
 
 
 def certify(model: Geometry, motion: Motion, threshold: FloatArray) -> Outcome:
-    """Outcome for every motion; thresholds (Z,) in m, -inf ignores a pair."""
+    """Outcome for every motion; thresholds (Z,) in m, -inf ignores a pair.
+
+    An interval of time is proved where the clearance in its middle exceeds what the capsules can
+    move until its ends; others are halved. An interval that is too short to be halved is stuck.
+    """
     span = motion.span()
     found = _Earliest(span)
     intervals = _Intervals(span)
@@ -240,19 +244,22 @@ def certify(model: Geometry, motion: Motion, threshold: FloatArray) -> Outcome:
         above = collision.distances(model, segments) - threshold
         spread = motion.spread(rows, middle, (high - low) / 2.0)
         moved = motion_bounds(model, poses, segments, spread) + MARGIN
+        left_over = above - moved
 
         each = np.arange(len(rows))
         nearest = above.argmin(axis=1)
-        doubtful = (above - moved).argmin(axis=1)
-        proved = (above - moved)[each, doubtful]
+        doubtful = left_over.argmin(axis=1)
+        proved = left_over[each, doubtful]
         hit = above[each, nearest] <= -MARGIN
         free = proved > 0.0
         np.minimum.at(found.bound, rows[free], proved[free])
         for k in np.flatnonzero(hit):
             found.hit(rows[k], middle[k], nearest[k])
 
-        located = np.isfinite(found.hit_at[rows]) & (high - low < LOCATE * span[rows])
-        stuck = ~free & (located | (~hit & (moved[each, doubtful] < RESOLUTION)))
+        short = high - low < LOCATE * span[rows]
+        located = np.isfinite(found.hit_at[rows]) & short
+        unresolved = ~hit & (moved[each, doubtful] < RESOLUTION)
+        stuck = ~free & (located | unresolved)
         for k in np.flatnonzero(stuck):
             found.stuck(rows[k], low[k], high[k], doubtful[k])
 

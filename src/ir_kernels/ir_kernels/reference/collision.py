@@ -35,40 +35,60 @@ def _inflate(axis: Witness, radius_a: FloatArray, radius_b: FloatArray) -> Witne
 
 
 def witnesses(model: Geometry, segments: FloatArray, pairs: IntArray) -> Witness:
-    """One pair (N,) of each row of capsule ends (N, C, 2, 3): distance, points on both surfaces,
-    normal from b to a.
+    """One pair (N,) of each row of capsule ends (N, C, 2, 3) [m]: distance, points on both
+    surfaces, normal from b to a. Pairs with bodies come first, then those of the arm with itself.
     """
-    result = Witness(np.empty(len(pairs)), *(np.empty((len(pairs), 3)) for _ in range(3)))
+    count = len(pairs)
+    on_first = np.empty((count, 3))
+    on_second = np.empty((count, 3))
+    normal = np.empty((count, 3))
+    result = Witness(np.empty(count), on_first, on_second, normal)
+
+    # all rows of one body together: -1 stands for pairs of two capsules
     outside = len(model.environment)
-    radius = model.capsules.radius
-    body_of = np.full(len(pairs), -1)
-    body_of[pairs < outside] = model.environment[pairs[pairs < outside], 1]
+    is_outside = pairs < outside
+    body_of = np.full(count, -1)
+    body_of[is_outside] = model.environment[pairs[is_outside], 1]
     for body in np.unique(body_of):
         rows = np.flatnonzero(body_of == body)
         if body < 0:
-            a, b = model.self_pairs[pairs[rows] - outside].T
-            first = segments[rows, a]
-            second = segments[rows, b]
-            found = segment_segment(first[:, 0], first[:, 1], second[:, 0], second[:, 1])
-            found = _inflate(found, radius[a], radius[b])
+            found = _between_capsules(model, segments[rows], pairs[rows] - outside)
         else:
-            a = model.environment[pairs[rows], 0]
-            rotation = model.scene.pose[body, :3, :3]
-            origin = model.scene.pose[body, :3, 3]
-            local = (segments[rows, a] - origin) @ rotation
-            hull = model.scene.hulls[body]
-            kind = int(model.scene.kind[body])
-            found = segment_body(local[:, 0], local[:, 1], kind, model.scene.size[body], hull)
-            found = _inflate(found, radius[a], np.zeros(len(rows)))
-            found = Witness(
-                found.distance,
-                found.on_segment @ rotation.T + origin,
-                found.on_body @ rotation.T + origin,
-                found.normal @ rotation.T,
-            )
+            capsule = model.environment[pairs[rows], 0]
+            found = _to_body(model, segments[rows, capsule], capsule, body)
         for whole, part in zip(result, found, strict=True):
             whole[rows] = part
     return result
+
+
+def _between_capsules(model: Geometry, segments: FloatArray, pairs: IntArray) -> Witness:
+    """Of pairs (N,) among the arm's own, at capsule ends (N, C, 2, 3)."""
+    radius = model.capsules.radius
+    a, b = model.self_pairs[pairs].T
+    rows = np.arange(len(pairs))
+    first = segments[rows, a]
+    second = segments[rows, b]
+    found = segment_segment(first[:, 0], first[:, 1], second[:, 0], second[:, 1])
+    return _inflate(found, radius[a], radius[b])
+
+
+def _to_body(model: Geometry, ends: FloatArray, capsule: IntArray, body: int) -> Witness:
+    """Of capsules (N,) with ends (N, 2, 3) and one body: computed in the body's frame, where its
+    shape is simple.
+    """
+    rotation = model.scene.pose[body, :3, :3]
+    origin = model.scene.pose[body, :3, 3]
+    local = (ends - origin) @ rotation
+    hull = model.scene.hulls[body]
+    kind = int(model.scene.kind[body])
+    found = segment_body(local[:, 0], local[:, 1], kind, model.scene.size[body], hull)
+    found = _inflate(found, model.capsules.radius[capsule], np.zeros(len(capsule)))
+    return Witness(
+        found.distance,
+        found.on_segment @ rotation.T + origin,
+        found.on_body @ rotation.T + origin,
+        found.normal @ rotation.T,
+    )
 
 
 def distances(model: Geometry, segments: FloatArray) -> FloatArray:

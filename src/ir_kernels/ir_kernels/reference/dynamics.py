@@ -41,8 +41,10 @@ def _outward(
     qd: Sequence[Number],
     qdd: Sequence[Number],
 ) -> tuple[list[Matrix], list[Vector], list[Vector]]:
-    """Rotation of each link in the one before, and force and moment that its motion takes, in its
-    frame.
+    """Rotation of each link in the one before, and force [N] and moment [N m] that its motion
+    takes, in its frame: from the base to the tool, every motion from that of the link before.
+
+    Gravity is an acceleration of the base upwards: no link needs a weight of its own.
     """
     zero = qd[0] * 0.0
     spin: Vector = (zero, zero, zero)
@@ -57,28 +59,47 @@ def _outward(
         arm = vector(data.origin[i, :3, 3])
         com = vector(data.com[i])
         slides = data.first_slides and i == 0
+
+        # the origin of the link, still moved by the link before
+        acceleration = add(acceleration, _of_rotation(spin, spin_rate, arm))
         if slides:
             R = matrix(data.origin[i, :3, :3])
+            to_link = transpose(R)
+            acceleration = add(apply(to_link, acceleration), scale(axis, qdd[i]))
+            own_speed = zero
+            own_rate = zero
         else:
             R = joint_rotation(data.origin[i], data.axis[i], sin[i], cos[i])
-        to_link = transpose(R)
-        acceleration = add(acceleration, add(cross(spin_rate, arm), cross(spin, cross(spin, arm))))
-        acceleration = apply(to_link, acceleration)
-        if slides:
-            acceleration = add(acceleration, scale(axis, qdd[i]))
+            to_link = transpose(R)
+            acceleration = apply(to_link, acceleration)
+            own_speed = qd[i]
+            own_rate = qdd[i]
+
+        # what the joint adds to the rotation that the link before carries it with
         carried = apply(to_link, spin)
-        relative = scale(axis, zero if slides else qd[i])
-        turned = scale(axis, zero if slides else qdd[i])
-        spin_rate = add(apply(to_link, spin_rate), add(turned, cross(carried, relative)))
+        relative = scale(axis, own_speed)
+        gyration = add(scale(axis, own_rate), cross(carried, relative))
+        spin_rate = add(apply(to_link, spin_rate), gyration)
         spin = add(carried, relative)
-        of_com = add(acceleration, add(cross(spin_rate, com), cross(spin, cross(spin, com))))
+
+        # Newton's and Euler's laws at the centre of mass
+        of_com = add(acceleration, _of_rotation(spin, spin_rate, com))
         force = scale(of_com, float(data.mass[i]))
         inertia = matrix(data.inertia[i])
-        moment = add(apply(inertia, spin_rate), cross(spin, apply(inertia, spin)))
+        momentum = apply(inertia, spin)
+        moment = add(apply(inertia, spin_rate), cross(spin, momentum))
         rotations.append(R)
         forces.append(force)
         moments.append(add(moment, cross(com, force)))
     return rotations, forces, moments
+
+
+def _of_rotation(spin: Vector, spin_rate: Vector, arm: Vector) -> Vector:
+    """Acceleration of a point at `arm` from the origin of a body that turns: tangential and
+    centripetal.
+    """
+    centripetal = cross(spin, cross(spin, arm))
+    return add(cross(spin_rate, arm), centripetal)
 
 
 def rigid_body_torque(
@@ -197,10 +218,43 @@ def bias(data: DynamicsData, q: FloatArray, qd: FloatArray) -> FloatArray:
 
 
 def mass_matrix(data: DynamicsData, q: FloatArray) -> FloatArray:
-    """H (N, n, n) without rotor inertia, by composite bodies in the frame of link 0."""
+    """H (N, n, n) [kg m^2, kg m, kg] at q (N, n) without rotor inertia, by composite bodies in the
+    frame of link 0.
+
+    Row i is the momentum of all links from i outwards while axis i alone moves with unit speed,
+    seen from each axis j before it: composite bodies need one sum from the tool to the base.
+    """
     N, n = q.shape
-    R = np.broadcast_to(np.eye(3), (N, 3, 3))
-    p = np.zeros((N, 3))
+    axes, origins, masses, moments, inertias = _bodies_in_base(data, q)
+    H = np.empty((N, n, n))
+    for i in reversed(range(n)):
+        if i < n - 1:  # the composite of all bodies from i outwards, about the origin of link 0
+            masses[i] = masses[i] + masses[i + 1]
+            moments[i] = moments[i] + moments[i + 1]
+            inertias[i] = inertias[i] + inertias[i + 1]
+        if data.first_slides and i == 0:
+            H[:, 0, 0] = masses[0]
+            break
+        # momentum of the composite turning about axis i with unit speed
+        velocity = np.cross(origins[i], axes[i])
+        linear = masses[i][:, None] * velocity + np.cross(axes[i], moments[i])
+        spin = np.einsum("nij,nj->ni", inertias[i], axes[i])
+        angular = spin + np.cross(moments[i], velocity)
+        for j in range(i + 1):
+            slides = data.first_slides and j == 0
+            along_j = linear if slides else angular - np.cross(origins[j], linear)
+            H[:, i, j] = H[:, j, i] = np.einsum("ni,ni->n", axes[j], along_j)
+    return H
+
+
+def _bodies_in_base(
+    data: DynamicsData, q: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Axes and origins (n, N, 3) of the joints at q (N, n), and of the links masses (n, N), mass
+    times centre of mass (n, N, 3) and inertia (n, N, 3, 3): about the origin of link 0, in its
+    frame.
+    """
+    N, n = q.shape
     axes = np.empty((n, N, 3))
     origins = np.empty((n, N, 3))
     masses = np.empty((n, N))
@@ -208,41 +262,24 @@ def mass_matrix(data: DynamicsData, q: FloatArray) -> FloatArray:
     inertias = np.empty((n, N, 3, 3))
     sin = np.sin(q)
     cos = np.cos(q)
+    R = np.broadcast_to(np.eye(3), (N, 3, 3))
+    p = np.zeros((N, 3))
     for i in range(n):
-        slides = data.first_slides and i == 0
         p = p + R @ data.origin[i, :3, 3]
         # where a rail stands changes no inertia: it is left at 0
-        local = joint_rotation(
-            data.origin[i],
-            data.axis[i],
-            np.zeros(N) if slides else sin[:, i],
-            np.ones(N) if slides else cos[:, i],
-        )
+        slides = data.first_slides and i == 0
+        sine = np.zeros(N) if slides else sin[:, i]
+        cosine = np.ones(N) if slides else cos[:, i]
+        local = joint_rotation(data.origin[i], data.axis[i], sine, cosine)
         R = R @ np.moveaxis(np.array(local), 2, 0)
         com = p + R @ data.com[i]
+        about_com = R @ data.inertia[i] @ np.swapaxes(R, 1, 2)
         axes[i] = R @ data.axis[i]
         origins[i] = p
         masses[i] = data.mass[i]
         moments[i] = data.mass[i] * com
-        inertias[i] = R @ data.inertia[i] @ np.swapaxes(R, 1, 2) + data.mass[i] * _about_origin(com)
-    H = np.empty((N, n, n))
-    for i in reversed(range(n)):
-        if i < n - 1:  # the composite of all bodies from i outwards, about the origin of link 0
-            masses[i] = masses[i] + masses[i + 1]
-            moments[i] = moments[i] + moments[i + 1]
-            inertias[i] = inertias[i] + inertias[i + 1]
-        # momentum of the composite turning about axis i with unit speed, or sliding along it
-        if data.first_slides and i == 0:
-            H[:, 0, 0] = masses[0]
-            break
-        velocity = np.cross(origins[i], axes[i])
-        linear = masses[i][:, None] * velocity + np.cross(axes[i], moments[i])
-        angular = np.einsum("nij,nj->ni", inertias[i], axes[i]) + np.cross(moments[i], velocity)
-        for j in range(i + 1):
-            about_j = angular - np.cross(origins[j], linear)
-            owed = linear if data.first_slides and j == 0 else about_j
-            H[:, i, j] = H[:, j, i] = np.einsum("ni,ni->n", axes[j], owed)
-    return H
+        inertias[i] = about_com + data.mass[i] * _about_origin(com)
+    return axes, origins, masses, moments, inertias
 
 
 def _about_origin(d: FloatArray) -> FloatArray:

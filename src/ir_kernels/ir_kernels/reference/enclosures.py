@@ -91,41 +91,89 @@ def _smooth_torque(
 def enclosure(
     data: DynamicsData, coefficients: FloatArray, rests: BoolArray, pieces: Pieces
 ) -> Enclosure:
-    """Of coefficients (S, n, terms), `rests` (S, n) of the motors, over pieces (K,)."""
+    """Speeds and torques of the motors over each of the pieces (K,), as intervals.
+
+    coefficients (S, n, terms): q(t) of segments by powers of their local time [s], in rad (m of a
+    rail). rests (S, n): motors that stand still through a segment, which have no Coulomb friction.
+    """
     middle = 0.5 * (pieces.begin + pieces.end)
     step = Interval((interval(pieces.begin) - middle).lo, (interval(pieces.end) - middle).hi)
-    points: list[list[Interval]] = [[], [], []]
-    ranges: list[list[Interval]] = [[], [], [], []]
-    for j in range(data.n):
-        a = [interval(c) for c in coefficients[pieces.segment, j].T]
-        for i in range(len(a) - 1):  # Taylor shift to the middle
-            for k in reversed(range(i, len(a) - 1)):
-                a[k] = a[k] + a[k + 1] * middle
-        for order in range(4):
-            ranges[order].append(_horner(a, step) if a else interval(0.0 * middle))
-            if order < 3:
-                points[order].append(a[0] if a else interval(0.0 * middle))
-            a = [c * float(k) for k, c in enumerate(a) if k > 0]
-    sin0, cos0 = zip(*(sine_cosine(q) for q in points[0]), strict=True)
-    at_middle, speed0 = _smooth_torque(data, sin0, cos0, points[1], points[2])
-    both = [sine_cosine(q) for q in ranges[0]]
-    over, speed = _smooth_torque(
-        data,
-        [Dual(s, c * v) for (s, c), v in zip(both, ranges[1], strict=True)],
-        [Dual(c, -(s * v)) for (s, c), v in zip(both, ranges[1], strict=True)],
-        [Dual(v, a) for v, a in zip(ranges[1], ranges[2], strict=True)],
-        [Dual(a, jerk) for a, jerk in zip(ranges[2], ranges[3], strict=True)],
-    )
-    torque = [
-        Dual(intersect(t.v, t0 + t.d * step), t.d) for t, t0 in zip(over, at_middle, strict=True)
+    at_middle, over_piece = _motion_over(data.n, coefficients, pieces, middle, step)
+
+    sines0 = []
+    cosines0 = []
+    for angle in at_middle[0]:
+        sine, cosine = sine_cosine(angle)
+        sines0.append(sine)
+        cosines0.append(cosine)
+    torque0, speed0 = _smooth_torque(data, sines0, cosines0, at_middle[1], at_middle[2])
+
+    # the same over the whole piece, each quantity with its derivative by time
+    angles, speeds, accelerations, jerks = over_piece
+    sines = []
+    cosines = []
+    for angle, rate in zip(angles, speeds, strict=True):
+        sine, cosine = sine_cosine(angle)
+        sines.append(Dual(sine, cosine * rate))
+        cosines.append(Dual(cosine, -(sine * rate)))
+    qd = [Dual(value, rate) for value, rate in zip(speeds, accelerations, strict=True)]
+    qdd = [Dual(value, rate) for value, rate in zip(accelerations, jerks, strict=True)]
+    torque_over, speed = _smooth_torque(data, sines, cosines, qd, qdd)
+
+    # both hold: what the piece gives directly, and the mean value form about its middle
+    torque = []
+    for over, centre in zip(torque_over, torque0, strict=True):
+        mean_value = centre + over.d * step
+        torque.append(Dual(intersect(over.v, mean_value), over.d))
+
+    still = rests[pieces.segment]
+    friction = [
+        _coulomb_friction(float(data.coulomb[j]), speed[j].v, still[:, j]) for j in range(data.n)
     ]
-    friction = []
-    for j, v in enumerate(each.v for each in speed):
-        size = float(data.coulomb[j])
-        still = rests[pieces.segment, j]
-        least = np.where(still, 0.0, np.where(v.lo > 0.0, size, -size))
-        friction.append(Interval(least, np.where(still, 0.0, np.where(v.hi < 0.0, -size, size))))
-    return Enclosure(step, speed0, at_middle, speed, torque, friction)
+    return Enclosure(step, speed0, torque0, speed, torque, friction)
+
+
+def _motion_over(
+    joints: int,
+    coefficients: FloatArray,
+    pieces: Pieces,
+    middle: FloatArray,
+    step: Interval,
+) -> tuple[list[list[Interval]], list[list[Interval]]]:
+    """q, qd and qdd of each joint in the middle (K,) of the pieces, and q, qd, qdd and jerk over
+    the whole of them: two lists by order of the derivative, then by joint. step: t - middle [s].
+    """
+    at_middle: list[list[Interval]] = [[], [], []]
+    over_piece: list[list[Interval]] = [[], [], [], []]
+    nothing = interval(0.0 * middle)
+    for j in range(joints):
+        terms = [interval(term) for term in coefficients[pieces.segment, j].T]
+        terms = _taylor_shifted(terms, middle)
+        for order in range(4):
+            over_piece[order].append(_horner(terms, step) if terms else nothing)
+            if order < 3:
+                at_middle[order].append(terms[0] if terms else nothing)
+            terms = [term * float(k) for k, term in enumerate(terms) if k > 0]
+    return at_middle, over_piece
+
+
+def _taylor_shifted(terms: list[Interval], middle: FloatArray) -> list[Interval]:
+    """Coefficients of the same polynomial by powers of t - middle."""
+    shifted = list(terms)
+    last = len(shifted) - 1
+    for lowest in range(last):
+        for k in reversed(range(lowest, last)):
+            shifted[k] = shifted[k] + shifted[k + 1] * middle
+    return shifted
+
+
+def _coulomb_friction(size: float, speed: Interval, still: BoolArray) -> Interval:
+    """Coulomb friction of a motor over pieces (K,): of the speed's sign where that is known, of
+    either sign else, none where the motor stands still.
+    """
+    least = np.where(speed.lo > 0.0, size, -size)
+    most = np.where(speed.hi < 0.0, -size, size)
+    return Interval(np.where(still, 0.0, least), np.where(still, 0.0, most))
 
 
 # A proof of the torque limits by interval arithmetic over pieces of the trajectory, halved where
@@ -203,7 +251,12 @@ def sampled_ratios(
 def torque_bounds(
     data: DynamicsData, coefficients: FloatArray, durations: FloatArray, tolerance: float, most: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, int]:
-    """Upper bound, largest sample, its time (n,), and how many intervals were examined."""
+    """Upper bound, largest sample, its time [s] (n,), and how many intervals were examined.
+
+    Both are of |torque| / limit of each motor along q(t) with coefficients (S, n, terms) over
+    durations (S,) [s]. Pieces whose bound exceeds the largest sample by more than `tolerance` are
+    halved, as long as at most `most` pieces are examined.
+    """
     n = data.n
     upper = np.zeros(n)
     sampled = np.full(n, -1.0)
@@ -215,7 +268,8 @@ def torque_bounds(
     spent = 0
     while len(pieces.segment):
         bound = upper_ratios(data, coefficients, rests, pieces)
-        for t in (pieces.begin, 0.5 * (pieces.begin + pieces.end), pieces.end):
+        middle = 0.5 * (pieces.begin + pieces.end)
+        for t in (pieces.begin, middle, pieces.end):
             ratio = sampled_ratios(data, coefficients, rests, pieces.segment, t)
             worst = ratio.argmax(axis=0)
             largest = ratio[worst, np.arange(n)]
@@ -223,19 +277,19 @@ def torque_bounds(
             time = np.where(largest > sampled, when, time)
             sampled = np.maximum(sampled, largest)
         spent += len(pieces.segment)
-        sharp = (
-            (bound <= sampled + tolerance * np.maximum(sampled, 1.0))
-            & ~((sampled <= 1.0) & (bound > 1.0))
-        ).all(axis=1)
+
+        # sharp enough, unless the limit lies between sample and bound: that decides
+        near = bound <= sampled + tolerance * np.maximum(sampled, 1.0)
+        undecided = (sampled <= 1.0) & (bound > 1.0)
+        sharp = (near & ~undecided).all(axis=1)
         short = pieces.end - pieces.begin <= SHORTEST * durations[pieces.segment]
         halve = ~sharp & ~short
         halve &= spent + 2 * np.cumsum(halve) <= most
         upper = np.maximum(upper, bound[~halve].max(axis=0, initial=0.0))
-        middle = 0.5 * (pieces.begin + pieces.end)
         pieces = Pieces(
-            np.repeat(pieces.segment[halve], 2),
-            np.stack([pieces.begin[halve], middle[halve]], axis=1).ravel(),
-            np.stack([middle[halve], pieces.end[halve]], axis=1).ravel(),
+            segment=np.repeat(pieces.segment[halve], 2),
+            begin=np.stack([pieces.begin[halve], middle[halve]], axis=1).ravel(),
+            end=np.stack([middle[halve], pieces.end[halve]], axis=1).ravel(),
         )
     return upper, sampled, time, spent
 

@@ -19,8 +19,8 @@ SINGULAR_WRIST = 1e-10  # sine of the wrist angle below which only q4 +- q6 is d
 
 
 def arm_branches(geometry: WristGeometry, centre: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """q1, q2, q3 (N, 4, 3) for wrist centres (N, 3) in the frame of link 0, and which exist (N, 4);
-    branches 00 01 10 11.
+    """q1, q2, q3 (N, 4, 3) [rad] for wrist centres (N, 3) [m] in the frame of link 0, and which
+    exist (N, 4); branches 00 01 10 11.
 
     Where the arm is stretched both elbows are the same: only the first exists. On axis 1 any q1
     serves: 0 is taken.
@@ -35,25 +35,27 @@ def arm_branches(geometry: WristGeometry, centre: FloatArray) -> tuple[FloatArra
     d = geometry.lateral
     beyond = radius < abs(d) - REACH_TOLERANCE
     forward = np.sqrt(np.maximum(radius**2 - d**2, 0.0))
+    heading = np.where(radius > 0.0, np.arctan2(y, x), 0.0)
     upper = abs(geometry.upper_arm)
     fore = abs(geometry.forearm)
+    longest = upper + fore
+    shortest = abs(upper - fore)
     opening = np.angle(np.conj(geometry.upper_arm) * geometry.forearm)
     for back in (0, 1):
         reach = geometry.forward * (-forward if back else forward)
         # q1 turns the plane to the wrist centre, over the base for `back`
-        q1 = np.where(radius > 0.0, np.arctan2(y, x), 0.0) - np.arctan2(d, reach)
+        q1 = heading - np.arctan2(d, reach)
         target = (z + 1j * reach) - geometry.shoulder
 
         # the triangle of upper arm, forearm and target: law of cosines for the bend of the elbow
         distance = np.abs(target)
         cosine = (distance**2 - upper**2 - fore**2) / (2.0 * upper * fore)
-        stretched = (distance > upper + fore) | (distance < abs(upper - fore))
-        reachable = (distance <= upper + fore + REACH_TOLERANCE) & (
-            distance >= abs(upper - fore) - REACH_TOLERANCE
-        )
-        bend = np.where(
-            stretched, np.where(cosine > 0.0, 0.0, np.pi), np.arccos(np.clip(cosine, -1.0, 1.0))
-        )
+        stretched = (distance > longest) | (distance < shortest)
+        not_too_far = distance <= longest + REACH_TOLERANCE
+        not_too_near = distance >= shortest - REACH_TOLERANCE
+        straight = np.where(cosine > 0.0, 0.0, np.pi)
+        bent = np.arccos(np.clip(cosine, -1.0, 1.0))
+        bend = np.where(stretched, straight, bent)
 
         for low in (0, 1):
             # q2 turns upper arm and bent forearm together onto the target
@@ -63,15 +65,16 @@ def arm_branches(geometry: WristGeometry, centre: FloatArray) -> tuple[FloatArra
             q[:, branch, 0] = q1
             q[:, branch, 1] = np.angle(target * np.conj(elbow))
             q[:, branch, 2] = geometry.elbow_sign * turn
-            exists[:, branch] = reachable & ~beyond & ~(stretched & bool(low))
+            same_as_first = stretched & bool(low)
+            exists[:, branch] = not_too_far & not_too_near & ~beyond & ~same_as_first
     return q, exists
 
 
 def wrist_branches(
     geometry: WristGeometry, arm: FloatArray, hand: FloatArray, free_q4: float
 ) -> tuple[FloatArray, BoolArray]:
-    """q4, q5, q6 (N, 2, 3) for arm angles (N, 3) and the hand's rotation (N, 3, 3) in link 0, and
-    which exist (N, 2).
+    """q4, q5, q6 (N, 2, 3) [rad] for arm angles (N, 3) and the hand's rotation (N, 3, 3) in link 0,
+    and which exist (N, 2).
 
     Where axes 4 and 6 are parallel only their sum is determined: one representative with q4 =
     `free_q4` exists.
@@ -86,25 +89,25 @@ def wrist_branches(
     W = np.swapaxes(before, 1, 2) @ hand @ geometry.hand[:3, :3].T
 
     # Axis 6 is turned by q4 and q5 only: its components along axes 4 and 5 and across give both.
-    e3 = np.cross(z[3], z[4])
-    pointing = W @ z[5]
-    c = pointing @ z[3]
-    a = pointing @ z[4]
-    b = pointing @ e3
-    s = np.hypot(a, b)
-    singular = s < SINGULAR_WRIST
+    across = np.cross(z[3], z[4])
+    axis6 = W @ z[5]
+    along4 = axis6 @ z[3]
+    along5 = axis6 @ z[4]
+    along_across = axis6 @ across
+    beside4 = np.hypot(along5, along_across)
+    singular = beside4 < SINGULAR_WRIST
     q = np.empty((len(arm), 2, 3))
     exists = np.empty((len(arm), 2), bool)
     for flip in (0, 1):
         sign = -1.0 if flip else 1.0
-        q4 = np.where(singular, free_q4, np.arctan2(sign * a, -sign * b))
-        q5 = np.arctan2(sign * s, c) - geometry.wrist_zero
+        q4 = np.where(singular, free_q4, np.arctan2(sign * along5, -sign * along_across))
+        q5 = np.arctan2(sign * beside4, along4) - geometry.wrist_zero
         # = exp(z6 q6), which turns axis 5 by q6
-        rest = np.swapaxes(axis_rotation(z[3], q4) @ axis_rotation(z[4], q5), 1, 2) @ W
-        turned = rest @ z[4]
-        q[:, flip] = np.stack(
-            [q4, q5, np.arctan2(turned @ np.cross(z[5], z[4]), turned @ z[4])], axis=1
-        )
+        outer = axis_rotation(z[3], q4) @ axis_rotation(z[4], q5)
+        rest = np.swapaxes(outer, 1, 2) @ W
+        axis5 = rest @ z[4]
+        q6 = np.arctan2(axis5 @ np.cross(z[5], z[4]), axis5 @ z[4])
+        q[:, flip] = np.stack([q4, q5, q6], axis=1)
         exists[:, flip] = ~(singular & bool(flip))
     return q, exists
 
@@ -122,21 +125,24 @@ def solve(
     geometry: WristGeometry, hand: FloatArray, position_min: FloatArray, position_max: FloatArray
 ) -> tuple[FloatArray, IntArray, IntArray]:
     """All q (M, 6) for poses of link 6 (N, 4, 4) in link 0, with pose index (M,) and branch (M,),
-    sorted by pose, branch, q.
+    sorted by pose, branch, q. Limits (6,) [rad]: every full turn within them is a solution.
     """
     centre = hand[:, :3, 3] + hand[:, :3, :3] @ geometry.wrist_in_hand
     arm, arm_exists = arm_branches(geometry, centre)
     free_q4 = float(np.clip(0.0, position_min[3], position_max[3]))
     found: list[tuple[int, int, tuple[float, ...]]] = []
-    for high in range(4):
-        wrist, wrist_exists = wrist_branches(geometry, arm[:, high], hand[:, :3, :3], free_q4)
+    for arm_branch in range(4):
+        wrist, wrist_exists = wrist_branches(geometry, arm[:, arm_branch], hand[:, :3, :3], free_q4)
         for flip in (0, 1):
-            for k in np.flatnonzero(arm_exists[:, high] & wrist_exists[:, flip]):
-                angles = [*arm[k, high], *wrist[k, flip]]
-                ranges = zip(angles, position_min, position_max, strict=True)
-                all_turns = [turns(float(v), float(lo), float(hi)) for v, lo, hi in ranges]
-                found.extend((int(k), 2 * high + flip, q) for q in product(*all_turns))
+            both_exist = arm_exists[:, arm_branch] & wrist_exists[:, flip]
+            for pose in np.flatnonzero(both_exist):
+                angles = [*arm[pose, arm_branch], *wrist[pose, flip]]
+                choices = []
+                for angle, low, high in zip(angles, position_min, position_max, strict=True):
+                    choices.append(turns(float(angle), float(low), float(high)))
+                found.extend((int(pose), 2 * arm_branch + flip, q) for q in product(*choices))
     found.sort()
-    q_all = np.array([entry[2] for entry in found]).reshape(-1, 6)
-    index = np.array([entry[0] for entry in found], np.int64)
-    return q_all, index, np.array([entry[1] for entry in found], np.int64)
+    poses = np.array([pose for pose, _, _ in found], np.int64)
+    branches = np.array([branch for _, branch, _ in found], np.int64)
+    configurations = np.array([q for _, _, q in found]).reshape(-1, 6)
+    return configurations, poses, branches

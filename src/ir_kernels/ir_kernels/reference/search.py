@@ -224,22 +224,25 @@ class Search:
         """
         here = self._trees[side]
         there = self._trees[1 - side]
-        pairs = [(*there.nearest(here.nodes[k]), k) for k in new]
+        pairs = [(*there.nearest(here.nodes[mine]), mine) for mine in new]
         pairs = sorted(pairs, key=lambda pair: pair[1])[:JOINED]
-        if pairs and pairs[0][1] < self._gap:
-            ends = [here.nodes[pairs[0][2]], there.nodes[pairs[0][0]]]
-            self._gap = pairs[0][1]
-            self._gap_ends = np.array(ends if side == 0 else ends[::-1])
+        if pairs:
+            other, distance, mine = pairs[0]
+            if distance < self._gap:
+                ends = [here.nodes[mine], there.nodes[other]]
+                self._gap = distance
+                self._gap_ends = np.array(ends if side == 0 else ends[::-1])
         pairs = yield from self._maybe_free(pairs, here, there)
         steps = [(there.nodes[other], here.nodes[mine]) for other, _, mine in pairs]
-        verdict, share = yield from self._certified(steps)
-        free = [
-            (mine, other) for (other, _, mine), v in zip(pairs, verdict, strict=True) if v == FREE
-        ]
+        verdicts, shares = yield from self._certified(steps)
+        free = []
+        for (other, _, mine), verdict in zip(pairs, verdicts, strict=True):
+            if verdict == FREE:
+                free.append((mine, other))
         if not free:
-            for (other, length, _), (q0, q1), part in zip(pairs, steps, share, strict=True):
-                if part * length >= SHORTEST:
-                    there.add(q0 + part * (q1 - q0), other)
+            for (other, length, _), (begin, end), share in zip(pairs, steps, shares, strict=True):
+                if share * length >= SHORTEST:
+                    there.add(begin + share * (end - begin), other)
         return free
 
     def _maybe_free(self, pairs: list[tuple[int, float, int]], here: Tree, there: Tree) -> Work:

@@ -73,23 +73,27 @@ def project_cylinder(points: FloatArray, radius: float, half_length: float) -> F
 
 
 def project_triangle(points: FloatArray, corners: FloatArray) -> FloatArray:
-    """Nearest point (N, F, 3) of each triangle (F, 3, 3): inside its prism the plane's, else the
-    nearest of its sides'.
+    """Nearest point (N, F, 3) to each of the points (N, 3) of each triangle (F, 3, 3): inside its
+    prism the plane's, else the nearest of its sides'. All in m.
     """
     # On each side: the foot of the perpendicular, within the side.
     start = corners
     along = corners[:, [1, 2, 0]] - start
     normal = cross(along[:, 0], along[:, 1])
-    offset = points[:, None, None] - start  # (N, F, 3, 3)
-    t = np.clip(np.sum(offset * along, axis=-1) / np.sum(along * along, axis=-1), 0.0, 1.0)
-    on_side = start + t[..., None] * along
-    nearest = np.sum((points[:, None, None] - on_side) ** 2, axis=-1).argmin(axis=-1)
-    on_side = np.take_along_axis(on_side, nearest[..., None, None], axis=2)[:, :, 0]
+    to_corner = points[:, None, None]
+    offset = to_corner - start  # (N, F, 3, 3)
+    squared_length = np.sum(along * along, axis=-1)
+    t = np.clip(np.sum(offset * along, axis=-1) / squared_length, 0.0, 1.0)
+    feet = start + t[..., None] * along
+    nearest_side = np.sum((to_corner - feet) ** 2, axis=-1).argmin(axis=-1)
+    on_side = np.take_along_axis(feet, nearest_side[..., None, None], axis=2)[:, :, 0]
 
     # Within the prism over the triangle: on the inner side of all three sides.
-    inside = (np.sum(offset * cross(normal[:, None], along), axis=-1) >= 0.0).all(axis=-1)
+    inwards = cross(normal[:, None], along)
+    inside = (np.sum(offset * inwards, axis=-1) >= 0.0).all(axis=-1)
     height = np.sum(offset[:, :, 0] * normal, axis=-1) / np.sum(normal * normal, axis=-1)
-    return np.where(inside[..., None], points[:, None] - height[..., None] * normal, on_side)
+    on_plane = points[:, None] - height[..., None] * normal
+    return np.where(inside[..., None], on_plane, on_side)
 
 
 def project_hull(points: FloatArray, hull: Hull) -> FloatArray:
@@ -155,43 +159,51 @@ def _golden_section(overlap: Callable[[FloatArray], FloatArray], best: IntArray)
 
 
 def depth_cylinder(p0: FloatArray, p1: FloatArray, radius: float, half_length: float) -> Depth:
-    """Penetration of segments (N, 3), (N, 3) into the cylinder about z."""
+    """Penetration of segments between p0 and p1 (N, 3) [m] into the cylinder about z.
+
+    Directions that may be the shallowest: both caps, straight out from the axis, and those across
+    the segment, along which a rim is left.
+    """
 
     def support(direction: FloatArray) -> FloatArray:
+        """How far the cylinder extends from its centre in directions (..., 3)."""
         sideways = np.linalg.norm(direction[..., :2], axis=-1)
         result: FloatArray = radius * sideways + half_length * np.abs(direction[..., 2])
         return result
 
+    rows = len(p0)
     d = p1 - p0
     flat = np.array([1.0, 1.0, 0.0])
-    length = np.sum((d * flat) ** 2, axis=1)
-    t = np.clip(-np.sum(p0 * d * flat, axis=1) / np.where(length > 0.0, length, 1.0), 0.0, 1.0)
-    across = unit(np.stack([-d[:, 1], d[:, 0], np.zeros(len(d))], axis=1))
+    squared_length = np.sum((d * flat) ** 2, axis=1)
+    safe = np.where(squared_length > 0.0, squared_length, 1.0)
+    t = np.clip(-np.sum(p0 * d * flat, axis=1) / safe, 0.0, 1.0)  # nearest to the axis
+    across = unit(np.stack([-d[:, 1], d[:, 0], np.zeros(rows)], axis=1))
     radial = unit((p0 + t[:, None] * d) * flat, across)
-    caps = np.broadcast_to([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]], (len(p0), 2, 3))
+    caps = np.broadcast_to([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]], (rows, 2, 3))
+
     # The rims, swept along the segment: directions perpendicular to it, on a circle.
     u = perpendicular(d)
     v = unit(cross(unit(d), u), u)
-    angle = np.broadcast_to(
-        np.arange(RIM_SAMPLES) * (2.0 * np.pi / RIM_SAMPLES), (len(p0), RIM_SAMPLES)
-    )
+    even = np.arange(RIM_SAMPLES) * (2.0 * np.pi / RIM_SAMPLES)
+    angles = np.broadcast_to(even, (rows, RIM_SAMPLES))
 
     def on_circle(angle: FloatArray) -> FloatArray:
-        result: FloatArray = (
-            u[:, None] * np.cos(angle)[..., None] + v[:, None] * np.sin(angle)[..., None]
-        )
+        cosine = np.cos(angle)[..., None]
+        sine = np.sin(angle)[..., None]
+        result: FloatArray = u[:, None] * cosine + v[:, None] * sine
         return result
 
     def overlap(angle: FloatArray) -> FloatArray:
+        """How far cylinder and segment overlap along directions at angles (N, K) [m]."""
         n = on_circle(angle)
-        ahead = np.minimum(np.einsum("nki,ni->nk", n, p0), np.einsum("nki,ni->nk", n, p1))
-        result: FloatArray = support(n) - ahead
+        ahead0 = np.einsum("nki,ni->nk", n, p0)
+        ahead1 = np.einsum("nki,ni->nk", n, p1)
+        result: FloatArray = support(n) - np.minimum(ahead0, ahead1)
         return result
 
-    closest = _golden_section(overlap, overlap(angle).argmin(axis=1))
-    direction = np.concatenate(
-        [caps, radial[:, None], -radial[:, None], on_circle(closest)], axis=1
-    )
+    closest = _golden_section(overlap, overlap(angles).argmin(axis=1))
+    outwards = radial[:, None]
+    direction = np.concatenate([caps, outwards, -outwards, on_circle(closest)], axis=1)
     return _shallowest(direction, support(direction), p0, p1)
 
 
@@ -253,42 +265,46 @@ def _from_solid(
 
 def segment_segment(a0: FloatArray, a1: FloatArray, b0: FloatArray, b1: FloatArray) -> Witness:
     """Nearest points of two segments (N, 3) per row: ends of each with the other, and both
-    insides.
+    insides. a0, a1 are the ends of the first [m], b0, b1 those of the second.
     """
     da = a1 - a0
     db = b1 - b0
     r = a0 - b0
-    aa, bb, ab = (np.sum(x * y, axis=1) for x, y in ((da, da), (db, db), (da, db)))
+    aa = np.sum(da * da, axis=1)
+    bb = np.sum(db * db, axis=1)
+    ab = np.sum(da * db, axis=1)
     ra = np.sum(r * da, axis=1)
     rb = np.sum(r * db, axis=1)
 
     def ratio(numerator: FloatArray, denominator: FloatArray) -> FloatArray:
-        safe = np.where(denominator > 0.0, denominator, 1.0)
-        return np.clip(np.where(denominator > 0.0, numerator / safe, 0.0), 0.0, 1.0)
+        """Within 0..1; 0 where a segment has no length or both are parallel."""
+        divides = denominator > 0.0
+        safe = np.where(divides, denominator, 1.0)
+        return np.clip(np.where(divides, numerator / safe, 0.0), 0.0, 1.0)
 
     zero = np.zeros(len(a0))
     one = np.ones(len(a0))
 
     # Both insides: the least |r + s da - t db|^2 has zero derivatives by s and t. Then each end of
     # either segment with the foot of its perpendicular on the other.
-    s = ratio(ab * rb - bb * ra, aa * bb - ab * ab)
-    choices = [
-        (s, ratio(rb + s * ab, bb)),
-        (zero, ratio(rb, bb)),
-        (one, ratio(rb + ab, bb)),
-        (ratio(-ra, aa), zero),
-        (ratio(ab - ra, aa), one),
-    ]
-    s = np.array([c[0] for c in choices])
-    t = np.array([c[1] for c in choices])
-    gap = r + s[..., None] * da - t[..., None] * db
-    best = np.sum(gap * gap, axis=-1).argmin(axis=0)
+    inside = ratio(ab * rb - bb * ra, aa * bb - ab * ab)
+    s_of_choices = np.array([inside, zero, one, ratio(-ra, aa), ratio(ab - ra, aa)])
+    t_of_choices = np.array(
+        [ratio(rb + inside * ab, bb), ratio(rb, bb), ratio(rb + ab, bb), zero, one]
+    )
+    gaps = r + s_of_choices[..., None] * da - t_of_choices[..., None] * db
+    best = np.sum(gaps * gaps, axis=-1).argmin(axis=0)
     rows = np.arange(len(a0))
-    gap = gap[best, rows]
-    s = s[best, rows]
-    t = t[best, rows]
-    normal = unit(gap, unit(cross(da, db), perpendicular(np.where((aa > bb)[:, None], da, db))))
-    return Witness(np.linalg.norm(gap, axis=1), a0 + s[:, None] * da, b0 + t[:, None] * db, normal)
+    gap = gaps[best, rows]
+    s = s_of_choices[best, rows]
+    t = t_of_choices[best, rows]
+
+    # segments that touch have no direction between them: then one across both, or across the longer
+    longer = np.where((aa > bb)[:, None], da, db)
+    across_both = unit(cross(da, db), perpendicular(longer))
+    normal = unit(gap, across_both)
+    distance = np.linalg.norm(gap, axis=1)
+    return Witness(distance, a0 + s[:, None] * da, b0 + t[:, None] * db, normal)
 
 
 def segment_body(

@@ -165,7 +165,11 @@ class SplineCost:
     def value(
         self, control: FloatArray, row: IntArray, interval: float
     ) -> tuple[float, FloatArray, float, float]:
-        """Cost, gradient (K, n), derivative by the interval, energy."""
+        """Cost, gradient (K, n), derivative by the interval, energy [J].
+
+        control (K, n): control points; row: of each interval that of its clearance terms;
+        interval: between knots [s].
+        """
         t = self.terms
         count = len(control) - 3
         step = interval / SAMPLES
@@ -175,25 +179,31 @@ class SplineCost:
         zeros = np.zeros((count * SAMPLES, control.shape[1]))
         q, qd, qdd = weights @ control
         s = CostSamples(q, qd, qdd, zeros, zeros.copy(), zeros.copy())
-        with np.errstate(
-            over="ignore", invalid="ignore"
-        ):  # as in the compiled core: inf and nan say it
+        # as in the compiled core: inf and nan say it
+        with np.errstate(over="ignore", invalid="ignore"):
             value, energy = self._drives(s, step)
             value += self._clearance(s, np.repeat(row, SAMPLES), step)
             value += self._tilt(s, step)
             gradient = weights[0].T @ s.of_q + weights[1].T @ s.of_qd + weights[2].T @ s.of_qdd
+
+            # a longer interval: more steps' time, and slower by it
             of_interval = s.of_step / SAMPLES + t.time_value * count
-            of_interval -= float(np.sum(s.of_qd * s.qd + 2.0 * s.of_qdd * s.qdd)) / interval
+            slower = float(np.sum(s.of_qd * s.qd + 2.0 * s.of_qdd * s.qdd))
+            of_interval -= slower / interval
             value += t.time_value * count * interval
             for order, limit in ((3, t.jerk), (2, t.acceleration)):
-                found = self._beyond(control, order, limit, interval)
-                value = value + found[0]
-                gradient = gradient + found[1]
-                of_interval = of_interval + found[2]
-            over = ABOUT * np.maximum(np.maximum(t.low - control, control - t.high), 0.0)
-            value += t.penalty * interval * float(np.sum(over**2))
+                cost, slope, slope_of_interval = self._beyond(control, order, limit, interval)
+                value = value + cost
+                gradient = gradient + slope
+                of_interval = of_interval + slope_of_interval
+
+            # control points beyond the joint limits
+            missing = np.maximum(t.low - control, control - t.high)
+            over = ABOUT * np.maximum(missing, 0.0)
+            squares = float(np.sum(over**2))
+            value += t.penalty * interval * squares
             gradient += 2.0 * t.penalty * interval * ABOUT * over * np.sign(control - t.high)
-            of_interval += t.penalty * float(np.sum(over**2))
+            of_interval += t.penalty * squares
         return value, gradient, of_interval, energy
 
     def descend(
@@ -206,30 +216,39 @@ class SplineCost:
         tolerance: float,
         ends: FloatArray,
     ) -> tuple[FloatArray, float, float, int]:
-        """New control (K, n), interval, value, evaluations; ends (2, 3, n), or none."""
+        """New control (K, n), interval [s], value, evaluations; ends (2, 3, n), or none.
+
+        ends: q, qd, qdd at both ends of a movement that starts or ends in motion, whose outer
+        control points depend on the interval. fixed: the interval stays. The variables are the
+        inner control points and the logarithm of the interval's ratio, which keeps it positive.
+        """
         m = len(control) - 6
         n = control.shape[1]
         metric = bending_metric(m, HOLDING)
 
         def spline(x: FloatArray) -> tuple[FloatArray, float]:
+            """All control points and the interval [s] of the variables."""
             with np.errstate(over="ignore"):
                 now = interval * np.exp(x[-1])
-            begin, end = (
-                [end_points(state, float(now)) for state in ends]
-                if ends.size
-                else (control[:3], control[-3:])
-            )
+            begin = control[:3]
+            end = control[-3:]
+            if ends.size:
+                begin = end_points(ends[0], float(now))
+                end = end_points(ends[1], float(now))
             return np.concatenate([begin, x[:-1].reshape(m, n), end]), float(now)
 
         def function(x: FloatArray) -> tuple[float, FloatArray]:
+            """Cost of the variables, and its gradient by them."""
             points, now = spline(x)
             with np.errstate(divide="ignore", invalid="ignore"):
                 value, gradient, of_interval, _ = self.value(points, row, now)
-                for state, owed in zip(ends, (gradient[:3], gradient[-3:]), strict=False):
-                    of_interval += float(np.sum(end_slopes(state, now) * owed))
-            return value, np.append(gradient[3:-3], 0.0 if fixed else of_interval * now)
+                for state, of_end in zip(ends, (gradient[:3], gradient[-3:]), strict=False):
+                    of_interval += float(np.sum(end_slopes(state, now) * of_end))
+            of_logarithm = 0.0 if fixed else of_interval * now
+            return value, np.append(gradient[3:-3], of_logarithm)
 
         def solve(v: FloatArray) -> FloatArray:
+            """A gradient as a step: by the metric of bending, not by single control points."""
             bent = np.linalg.solve(metric, v[:-1].reshape(m, n)) * self.terms.velocity**2
             return np.append(bent, v[-1] * INTERVAL_WEIGHT)
 
@@ -239,30 +258,40 @@ class SplineCost:
         return points, now, value, used
 
     def _drives(self, s: CostSamples, step: float) -> tuple[float, float]:
-        """Cost of energy and travel, of torque and speed beyond their limits; and the energy."""
+        """Cost of energy and travel, of torque and speed beyond their limits; and the energy [J].
+
+        Adds their slopes to those of the samples `s`, which are `step` s apart. One pass forward
+        to the cost, then back: slopes by torque and motor speed, from these by q, qd and qdd.
+        """
         t = self.terms
         data = self.data
         torque = torques(data, s)
         turning = dynamics.motor_speed(data, s.qd)
         limit, falls = torque_limit(data, np.abs(turning))
+        allowed = limit * t.torque_share
         # near standstill friction may be as much more than it is with its smoothed sign
         unsure = data.coulomb * (STILL / np.hypot(turning, STILL)) ** 2
-        use = (np.abs(torque) + unsure) / (limit * t.torque_share)
+        use = (np.abs(torque) + unsure) / allowed
         too_much = np.maximum(use - 1.0, 0.0)
         too_fast = np.maximum(np.abs(s.qd) / t.velocity - 1.0, 0.0)
         travelled = t.travel * (np.hypot(s.qd, STILL) - STILL)
         rate = t.penalty * float(np.sum(too_much**2 + too_fast**2)) + float(np.sum(travelled))
+
+        # slopes of the penalties and of travel
         weight = 2.0 * t.penalty * step * too_much
-        of_torque = weight * np.sign(torque) / (limit * t.torque_share)
+        of_torque = weight * np.sign(torque) / allowed
         s.of_qd += np.sign(s.qd) * (2.0 * t.penalty * step * too_fast / t.velocity)
         of_speed = -np.sign(turning) * (weight * use / limit * falls)
         slow = turning / np.hypot(turning, STILL) ** 2
-        of_speed -= 2.0 * weight / (limit * t.torque_share) * unsure * slow
+        of_speed -= 2.0 * weight / allowed * unsure * slow
         s.of_qd += step * t.travel * s.qd / np.hypot(s.qd, STILL)
+
+        # slopes of the energy
         power = dynamics.axis_power(data, s.qd, torque)
         energy, adds, of_step = bus(power, step, t)
         of_power = t.energy_value * step * adds
-        of_torque += of_power * (turning + 2.0 * data.copper_loss / data.gear_ratio**2 * torque)
+        copper_slope = 2.0 * data.copper_loss / data.gear_ratio**2 * torque
+        of_torque += of_power * (turning + copper_slope)
         of_speed += of_power * torque
         s.of_qd += of_speed @ data.coupling.turns
         torques_back(data, s, of_torque)
