@@ -36,7 +36,10 @@ def in_people_units(joint_names: Sequence[str], values: FloatArray) -> FloatArra
 def hermite_coefficients(
     q: FloatArray, qd: FloatArray | None, qdd: FloatArray | None, durations: FloatArray
 ) -> FloatArray:
-    """Coefficients c (S, n, 6) of q(t) = sum_k c_k t^k [s] through points q, qd, qdd (S+1, n)."""
+    """Coefficients c (S, n, 6) of q(t) = sum_k c_k t^k [s] through points q, qd, qdd (S+1, n).
+
+    Quintic; without qdd cubic, without qd linear: what is left out is 0.
+    """
     T = durations[:, None]
     delta = q[1:] - q[:-1]
     c = np.zeros((len(durations), q.shape[1], 6))
@@ -54,11 +57,12 @@ def hermite_coefficients(
     a0 = qdd[:-1]
     a1 = qdd[1:]
     c[:, :, 2] = 0.5 * a0
-    c[:, :, 3] = (20.0 * delta / T - 8.0 * v1 - 12.0 * v0 - (3.0 * a0 - a1) * T) / (2.0 * (T * T))
-    c[:, :, 4] = (-30.0 * delta / T + 14.0 * v1 + 16.0 * v0 + (3.0 * a0 - 2.0 * a1) * T) / (
-        2.0 * (T * T) * T
-    )
-    c[:, :, 5] = (12.0 * delta / T - 6.0 * (v0 + v1) - (a0 - a1) * T) / (2.0 * (T * T) * (T * T))
+    third = 20.0 * delta / T - 8.0 * v1 - 12.0 * v0 - (3.0 * a0 - a1) * T
+    fourth = -30.0 * delta / T + 14.0 * v1 + 16.0 * v0 + (3.0 * a0 - 2.0 * a1) * T
+    fifth = 12.0 * delta / T - 6.0 * (v0 + v1) - (a0 - a1) * T
+    c[:, :, 3] = third / (2.0 * (T * T))
+    c[:, :, 4] = fourth / (2.0 * (T * T) * T)
+    c[:, :, 5] = fifth / (2.0 * (T * T) * (T * T))
     return c
 
 

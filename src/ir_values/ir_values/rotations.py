@@ -17,7 +17,9 @@ def quaternions_from_rotations(rotations: FloatArray) -> FloatArray:
     that is not 0 is positive.
     """
     R = np.asarray(rotations, dtype=np.float64)
-    xx, yy, zz = (R[..., k, k] for k in range(3))
+    xx = R[..., 0, 0]
+    yy = R[..., 1, 1]
+    zz = R[..., 2, 2]
     trace = xx + yy + zz
     xy = R[..., 1, 0] + R[..., 0, 1]
     xz = R[..., 0, 2] + R[..., 2, 0]
@@ -25,17 +27,21 @@ def quaternions_from_rotations(rotations: FloatArray) -> FloatArray:
     xw = R[..., 2, 1] - R[..., 1, 2]
     yw = R[..., 0, 2] - R[..., 2, 0]
     zw = R[..., 1, 0] - R[..., 0, 1]
-    by_largest = (
-        (1.0 - trace + 2.0 * xx, xy, xz, xw),
-        (xy, 1.0 - trace + 2.0 * yy, yz, yw),
-        (xz, yz, 1.0 - trace + 2.0 * zz, zw),
-        (xw, yw, zw, 1.0 + trace),
-    )
-    candidates = np.stack([np.stack(each, axis=-1) for each in by_largest], axis=-2)
+
+    # four multiples of the quaternion, each of which is short where its own entry is small
+    from_x = np.stack((1.0 - trace + 2.0 * xx, xy, xz, xw), axis=-1)
+    from_y = np.stack((xy, 1.0 - trace + 2.0 * yy, yz, yw), axis=-1)
+    from_z = np.stack((xz, yz, 1.0 - trace + 2.0 * zz, zw), axis=-1)
+    from_w = np.stack((xw, yw, zw, 1.0 + trace), axis=-1)
+    candidates = np.stack([from_x, from_y, from_z, from_w], axis=-2)
     largest = np.argmax(np.stack([xx, yy, zz, trace], axis=-1), axis=-1)
     q = np.take_along_axis(candidates, largest[..., None, None], axis=-2)[..., 0, :]
-    x, y, z, w = (q[..., k] for k in range(4))
-    q = q / np.sqrt(x * x + y * y + z * z + w * w)[..., None]
+    x = q[..., 0]
+    y = q[..., 1]
+    z = q[..., 2]
+    w = q[..., 3]
+    length = np.sqrt(x * x + y * y + z * z + w * w)
+    q = q / length[..., None]
     return np.where(_is_reversed(q)[..., None], -q, q)
 
 
@@ -56,7 +62,10 @@ def rotations_from_quaternions(quaternions: FloatArray) -> FloatArray:
 
 def rotations_from_unit_quaternions(quaternions: FloatArray) -> FloatArray:
     """Rotations (..., 3, 3) of quaternions (..., 4) x, y, z, w of length 1."""
-    x, y, z, w = (quaternions[..., k] for k in range(4))
+    x = quaternions[..., 0]
+    y = quaternions[..., 1]
+    z = quaternions[..., 2]
+    w = quaternions[..., 3]
     rows = (
         (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
         (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
