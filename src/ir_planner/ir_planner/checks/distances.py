@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ir_kernels.collision import FREE, Witnesses
+from ir_kernels.collision import FREE, MinDistance, Witnesses
 from ir_msgs_py.report import DistancePair
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner.curves import motion_at
@@ -144,25 +144,34 @@ def _nearest_between(
     times: FloatArray,
     distances: FloatArray,
 ) -> _Lowest:
-    """The smallest distance at any instant, from samples (N,): looked for around the lowest
-    samples, then proved; where the proof meets a smaller one, from there again.
+    """The smallest distance [m] at any instant, from samples (N,) at times [s]: looked for around
+    the lowest samples, then proved; where the proof meets a smaller one, from there again.
+
+    offset (Z,): 0 for pairs that count, -inf for those that may touch.
     """
+
+    def looked_for(centres: FloatArray, width: float) -> tuple[float, MinDistance]:
+        """The lowest instant near the centres [s], and its distance."""
+        time = _zoomed(trajectory, scene, offset, centres, width)
+        q = motion_at(trajectory, np.array([time])).q
+        return time, scene.collision.min_distance(q, offset)
+
     step = float(times[1] - times[0])
-    time = _zoomed(trajectory, scene, offset, times[_local_minima(distances)], step)
-    near = scene.collision.min_distance(motion_at(trajectory, np.array([time])).q, offset)
+    time, near = looked_for(times[_local_minima(distances)], step)
     coefficients, durations = trajectory.coefficients()
     lasting = np.mean(distances <= near.distance[0] + _TIGHT)
     tight = _TIGHT_FOR_LONG if lasting > _LONG else _TIGHT
     for _ in range(_PROOFS):
-        level = float(near.distance[0]) - tight
+        lowest = float(near.distance[0])
+        level = lowest - tight
         if near.pair[0] < 0 or len(durations) == 0:
-            return _Lowest(time, near, float(near.distance[0]))
+            return _Lowest(time, near, lowest)
         found = scene.collision.certify_trajectory(coefficients, durations, offset + level)
         if found.verdict == FREE:
             return _Lowest(time, near, level)
-        first, last = (float(times[0]) + t for t in found.interval)
-        there = _zoomed(trajectory, scene, offset, np.array([0.5 * (first + last)]), last - first)
-        again = scene.collision.min_distance(motion_at(trajectory, np.array([there])).q, offset)
+        first = float(times[0]) + found.interval[0]
+        last = float(times[0]) + found.interval[1]
+        there, again = looked_for(np.array([0.5 * (first + last)]), last - first)
         if again.distance[0] < near.distance[0]:
             time = there
             near = again

@@ -143,18 +143,22 @@ def _emptied(bus: DcBus, scene: PlanningScene) -> float:
 
 
 def _axis_slope(at: _States, scene: PlanningScene) -> FloatArray:
-    """The part of friction, losses and masses; rectifier and constant watts are zero."""
+    """Derivatives [J per unit of the parameter] of the energy by all parameters: the part of
+    friction, losses and masses; rectifier and constant watts are zero.
+    """
     parameters = scene.parameters
     model = scene.dynamics
     d = scene.dynamics.data
     q = at.motion.q
-    qd, qdd = (d.coupling.motors(each) for each in (at.motion.qd, at.motion.qdd))  # of the motors
+    qd = d.coupling.motors(at.motion.qd)  # of the motors
+    qdd = d.coupling.motors(at.motion.qdd)
     speed = np.abs(qd)
     size = np.abs(at.torque)
     ratio = np.abs(d.gear_ratio)
     sign = np.sign(at.torque)
     losses = d.inverter_loss / ratio + d.gear_loss * speed
-    of_torque = at.price * (qd + 2.0 * d.copper_loss / (ratio * ratio) * at.torque + sign * losses)
+    copper = 2.0 * d.copper_loss / (ratio * ratio) * at.torque
+    of_torque = at.price * (qd + copper + sign * losses)
     direction = np.sign(qd)
     slope = np.zeros(len(parameters.names))
     axes = {
@@ -168,16 +172,26 @@ def _axis_slope(at: _States, scene: PlanningScene) -> FloatArray:
     for term in AXIS_UNITS:
         slope[parameters.places(term)] = axes[term].sum(axis=0)
     slope[parameters.index(IDLE)] = at.price.mean(axis=1).sum()  # of all axes alike
+
+    # torques that grow in proportion to one parameter
     rotor = d.rotor_inertia * qdd
     balance = d.coupling.motor_torque(model.counterbalance(q))
     body = at.torque - rotor - d.viscous * qd - d.coulomb * direction + balance
     carried = _load_torque(at, scene)
-    scaled = {"rotor_inertia": rotor, "counterbalance": -balance, "load_mass": carried}
-    for name, torque in (*scaled.items(), ("link_mass", body - carried)):
+    proportional = {
+        "rotor_inertia": rotor,
+        "counterbalance": -balance,
+        "load_mass": carried,
+        "link_mass": body - carried,
+    }
+    for name, torque in proportional.items():
         value = max(parameters.value(name), 1e-9)
         slope[parameters.index(name)] = float((of_torque * torque).sum()) / value
+
+    # centres of mass: by differences, as they change torques in no simple way
+    motion = at.motion[:3]
     for k, (less, more) in scene.moved_centres.items():
-        moved = more.inverse_dynamics(*at.motion[:3]) - less.inverse_dynamics(*at.motion[:3])
+        moved = more.inverse_dynamics(*motion) - less.inverse_dynamics(*motion)
         slope[k] = float((of_torque * moved).sum()) / CENTRE_STEP
     return slope
 

@@ -54,29 +54,35 @@ def tool_derivatives(
 ) -> ToolDerivatives:
     """Bounds along a trajectory of places at most `farthest` m from the origin of the last link,
     None: of the tcp. largest: the extremes of its polynomials, where they are known.
+
+    A place turns with all axes before it: sums of the joints' extremes bound how fast, and
+    `_reach` [m] how far from each axis it is.
     """
     coefficients, durations = trajectory.coefficients()
     top = extremes(coefficients, durations) if largest is None else largest
     end = portable.norm(scene.chain.tcp[:3, 3]) if farthest is None else farthest
     reach = _reach(scene, end)
+    # the fourth derivative of a quintic is linear: largest at an end of its segment
     fourth = 24.0 * coefficients[:, :, 4]
     last = fourth + 120.0 * coefficients[:, :, 5] * durations[:, None]
-    axes = (top.velocity, top.acceleration, top.jerk, np.maximum(np.abs(fourth), np.abs(last)))
+    joint_snap = np.maximum(np.abs(fourth), np.abs(last))
+
     base = scene.cell.robot.base
-    v, a, j, s = (np.cumsum(one[:, base:], axis=1) for one in axes)
+    v = np.cumsum(top.velocity[:, base:], axis=1)
+    a = np.cumsum(top.acceleration[:, base:], axis=1)
+    j = np.cumsum(top.jerk[:, base:], axis=1)
+    s = np.cumsum(joint_snap[:, base:], axis=1)
     square = v * v
-    sums = np.stack(
-        [
-            a + square,
-            j + 3.0 * a * v + square * v,
-            s + 4.0 * j * v + 3.0 * a * a + 6.0 * a * square + square * square,
-        ]
-    )
+    of_acceleration = a + square
+    of_jerk = j + 3.0 * a * v + square * v
+    of_snap = s + 4.0 * j * v + 3.0 * a * a + 6.0 * a * square + square * square
+    sums = np.stack([of_acceleration, of_jerk, of_snap])
     outermost = sums.copy()  # of the terms whose outermost axis is each one
     outermost[:, :, 1:] -= sums[:, :, :-1]
     bounds = portable.matmul(outermost, reach)
     if base:  # a rail moves every place by its own motion
-        bounds = bounds + np.stack([one[:, 0] for one in axes[1:]])
+        of_rail = [top.acceleration[:, 0], top.jerk[:, 0], joint_snap[:, 0]]
+        bounds = bounds + np.stack(of_rail)
     acceleration, jerk, snap = bounds
     return ToolDerivatives(
         trajectory.times,
@@ -135,6 +141,8 @@ def tool_states(
 ) -> tuple[FloatArray, FloatArray]:
     """Largest speed [m/s] and acceleration [m/s^2] (N,) of the spheres around points of the tool,
     at states (N, n): those of the centre, and what turning adds on its surface at most.
+
+    Along the chain: the origin of each frame moves with the one before it, and by its turning.
     """
     states = (2, 3, 1, 0)  # last, where arrays of states are fast
     poses = np.ascontiguousarray(scene.chain.link_poses(q)[:, :, :3].transpose(states))
@@ -151,10 +159,16 @@ def tool_states(
     before = np.zeros_like(turn)
     before[:, 1:] = turn[:, :-1]
     change = _after(bend, _cross(before, rate))
+
+    # speed and acceleration of the origin of the last frame
     arm = places[:, 1:] - places[:, :-1]
     lift = _cross(turn[:, :-1], arm)
-    speed = _after(lift)[:, -1:] + slide[0]  # at the origin of the last one
-    gain = _after(_cross(change[:, :-1], arm), _cross(turn[:, :-1], lift))[:, -1:] + slide[1]
+    tangential = _cross(change[:, :-1], arm)
+    centripetal = _cross(turn[:, :-1], lift)
+    speed = _after(lift)[:, -1:] + slide[0]
+    gain = _after(tangential, centripetal)[:, -1:] + slide[1]
+
+    # and of the tool's points, which are fixed to it
     turn = turn[:, -1:]
     change = change[:, -1:]
     swing = _length(turn)

@@ -64,8 +64,8 @@ def free_configurations(
     rail: float | FloatArray | None = None,
 ) -> Configurations:
     """All configurations that bring the tcp to `pose` (4, 4) with every pair above its threshold
-    (Z,); on a rail those at the place `rail` [m] or at places (P,), None: at places over its travel
-    and at that of near (n,).
+    (Z,) [m]; on a rail those at the place `rail` [m] or at places (P,), None: at places over its
+    travel and at that of near (n,). Cheapest from `near` first.
     """
     places = scene.rail_places(near) if rail is None else np.atleast_1d(rail)
     found = scene.inverse_kinematics_at(places).solve(np.asarray(pose)[None])
@@ -74,18 +74,20 @@ def free_configurations(
         return Configurations(found.q, found.branch, 0, rejected)
     limit = threshold - END_TOLERANCE
     closest = scene.collision.min_distance(found.q, limit)
-    for k in range(len(found.q)):
-        z = int(closest.pair[k])
-        if z >= 0 and closest.distance[k] <= limit[z]:
-            pair = scene.collision.pairs[z]
-            rejected[f"{pair.body_a} too near {pair.body_b}"] += 1
-    free = np.array(
-        [z < 0 or d > limit[z] for z, d in zip(closest.pair, closest.distance, strict=True)]
-    )
+    is_free = []
+    for pair, distance in zip(closest.pair, closest.distance, strict=True):
+        too_near = pair >= 0 and distance <= limit[pair]
+        is_free.append(not too_near)
+        if too_near:
+            bodies = scene.collision.pairs[pair]
+            rejected[f"{bodies.body_a} too near {bodies.body_b}"] += 1
+    free = np.array(is_free)
     q = found.q[free]
     branch = found.branch[free]
     margin = closest.distance[free]
-    order = np.lexsort((-margin, np.round(movement_cost(scene.weights, near, q), 6)))
+    # of configurations that cost the same the one with more clearance
+    cost = np.round(movement_cost(scene.weights, near, q), 6)
+    order = np.lexsort((-margin, cost))
     if len(places) > 1:
         order = _varied(q[order], branch[order], order)
     nearest = "" if len(q) else _least_lacking(scene, closest, threshold)
@@ -151,29 +153,31 @@ def ranked_solutions(
     threshold: FloatArray,
     near: FloatArray,
 ) -> tuple[IkSolution, ...]:
-    """The configurations with errors, branch, turns, clearance and cost from `near` (n,)."""
-    names = scene.cell.robot.joint_names
+    """The configurations with errors [m, rad] against pose (4, 4), branch, turns, clearance [m] and
+    cost from `near` (n,), in the order in which they are found.
+    """
+    wanted = np.asarray(pose)
     solutions = []
     for q, branch in zip(found.q, found.branch, strict=True):
         T = scene.chain.tcp_poses(q[None])[0]
-        R = portable.matmul(T[:3, :3].T, np.asarray(pose)[:3, :3])
+        R = portable.matmul(T[:3, :3].T, wanted[:3, :3])
         twist = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+        sine = portable.norm(twist)
+        cosine = 0.5 * (np.trace(R) - 1.0)
+        turns = np.ceil((q - np.pi) / (2.0 * np.pi) - 1e-12)
         closest = nearest_pair(scene, q, threshold)
-        solutions.append(
-            IkSolution(
-                joint_names=names,
-                q=q,
-                position_error=float(portable.norm(T[:3, 3] - np.asarray(pose)[:3, 3])),
-                rotation_error=float(
-                    portable.arctan2(portable.norm(twist), 0.5 * (np.trace(R) - 1.0))
-                ),
-                branch=int(branch),
-                turns=tuple(int(turn) for turn in np.ceil((q - np.pi) / (2.0 * np.pi) - 1e-12)),
-                clearance=np.inf if closest is None else closest.distance,
-                movement_cost=float(movement_cost(scene.weights, near, q)),
-                closest=closest,
-            )
+        solution = IkSolution(
+            joint_names=scene.cell.robot.joint_names,
+            q=q,
+            position_error=float(portable.norm(T[:3, 3] - wanted[:3, 3])),
+            rotation_error=float(portable.arctan2(sine, cosine)),
+            branch=int(branch),
+            turns=tuple(int(turn) for turn in turns),
+            clearance=np.inf if closest is None else closest.distance,
+            movement_cost=float(movement_cost(scene.weights, near, q)),
+            closest=closest,
         )
+        solutions.append(solution)
     return tuple(solutions)
 
 

@@ -103,13 +103,15 @@ def _velocities(h: FloatArray, turn: FloatArray) -> FloatArray:
         return velocity
     identity = np.eye(3)
     matrix = np.zeros((inner, 3, inner, 3))
-    right = 6.0 * (turn[:-1] / h[:-1, None] ** 2 + turn[1:] / h[1:, None] ** 2)
+    squares = h[:, None] ** 2
+    right = 6.0 * (turn[:-1] / squares[:-1] + turn[1:] / squares[1:])
     after = _inverse_jacobians(turn)
     before = portable.inv(after)
     for k in range(inner):
         matrix[k, :, k] = (4.0 / h[k] + 4.0 / h[k + 1]) * identity
         low = 2.0 / h[k] * before[k]
         high = 2.0 / h[k + 1] * after[k + 1]
+        # the velocities at both ends are known: they stand on the right
         if k > 0:
             matrix[k, :, k - 1] = low
         else:
@@ -119,13 +121,15 @@ def _velocities(h: FloatArray, turn: FloatArray) -> FloatArray:
         else:
             right[k] -= portable.matmul(high, velocity[-1])
     size = 3 * inner
+    flat = matrix.reshape(size, size)
     for _ in range(_ITERATIONS):
         end = _inverse_times(turn[:-1], velocity[1:-1])
         sides = (right - _curved(turn[:-1], end)).reshape(size, 1)
-        found = portable.solve(matrix.reshape(size, size), sides).reshape(inner, 3)
+        found = portable.solve(flat, sides).reshape(inner, 3)
         change = np.abs(found - velocity[1:-1])
         velocity[1:-1] = found
-        if (change < _SETTLED * (1.0 + np.abs(found))).all():
+        settled = _SETTLED * (1.0 + np.abs(found))
+        if (change < settled).all():
             break
     return velocity
 

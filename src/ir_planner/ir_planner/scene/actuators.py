@@ -37,7 +37,7 @@ class LinkVoltage(NamedTuple):
 
 
 def within_current_and_voltage(robot: RobotModel, link: LinkVoltage) -> RobotModel:
-    """The robot with the envelope that follows from current and voltage.
+    """The robot with the envelope of torque over speed that follows from current and voltage.
 
     Raises RequestError where the voltage does not reach full speed.
     """
@@ -52,7 +52,10 @@ def within_current_and_voltage(robot: RobotModel, link: LinkVoltage) -> RobotMod
     peak = np.asarray(robot.envelope_torque)[:, 0] / torque_per_ampere
     last = np.asarray(robot.envelope_torque)[:, -1] / torque_per_ampere
     _check(robot, emf * full, voltage)
-    left = (nominal / np.sqrt(6.0)) ** 2 - np.square(emf * full + resistance * last)
+
+    # the reactance is what is left of the nominal voltage at full speed with the last current
+    in_phase = emf * full + resistance * last
+    left = (nominal / np.sqrt(6.0)) ** 2 - np.square(in_phase)
     reactance = np.sqrt(np.maximum(left, 0.0)) / (last * full)  # ohm per rad/s of the joint
     phase = voltage / np.sqrt(6.0)
 
@@ -69,12 +72,15 @@ def within_current_and_voltage(robot: RobotModel, link: LinkVoltage) -> RobotMod
         )
         return np.asarray(np.minimum(bound, peak))
 
+    # knots from the speed on at which the voltage begins to bound the current
     fractions = np.linspace(1.0 / _GRID, 1.0, _GRID)[:, None] * full
     free = ampere(fractions) >= peak
-    knee = np.where(free.all(axis=0), 0.5 * full, np.sum(free, axis=0) / _GRID * full)
+    free_share = np.sum(free, axis=0) / _GRID
+    knee = np.where(free.all(axis=0), 0.5 * full, free_share * full)
     knee = np.clip(knee, full / _GRID, (1.0 - 1.0 / _GRID) * full)
     speeds = knee + np.linspace(0.0, 1.0, _KNOTS)[:, None] * (full - knee)
     allowed = ampere(speeds)
+
     # Between two knots the envelope is straight. Both it and the bound fall with the speed, so in a
     # piece it is at most its begin and the bound at least its end: lowered by that, it is nowhere
     # above the bound.

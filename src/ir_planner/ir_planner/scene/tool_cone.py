@@ -124,26 +124,32 @@ class ToolCone:
         return q
 
     def _inwards(self, q: FloatArray, goal: float, cheap: FloatArray) -> FloatArray:
-        """Turns (N, n) of the joints after which the tilt at q (N, n) is about `goal` rad: the
-        least ones, damped.
+        """Turns (N, n) of the joints [rad] after which the tilt at q (N, n) is about `goal` rad:
+        the least ones, damped. cheap (n,): how readily each joint is turned.
         """
         axis = self._axis(q)
         around = np.cross(axis, self.direction)
         sine = np.linalg.norm(around, axis=1)
         cosine = (axis * self.direction).sum(axis=1)
+        excess = portable.arctan2(sine, cosine) - goal
+
+        # an axis that points straight away may tilt about anything that lies across it
         aside = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis), axis=1)])
         straight = sine < _STRAIGHT
         around = np.where(straight[:, None], aside, around)
         around /= np.linalg.norm(around, axis=1)[:, None]
-        excess = portable.arctan2(sine, cosine) - goal
+
+        # turning about the axis itself tilts nothing
         turning = self.chain.jacobian(np.ascontiguousarray(q))[:, 3:, :]
-        across = turning - axis[:, :, None] * (axis[:, :, None] * turning).sum(axis=1)[:, None, :]
+        column = axis[:, :, None]
+        across = turning - column * (column * turning).sum(axis=1)[:, None, :]
         gram = portable.matmul(across * cheap, across.transpose(0, 2, 1))
         gram += (_DAMPING * cheap.max()) * np.eye(3)
         wanted = (excess[:, None] * around)[:, :, None]
         step = (across * portable.solve(gram, wanted)).sum(axis=1) * cheap
         size = np.abs(step).max(axis=1)
-        return np.asarray(step * np.minimum(1.0, _LONGEST / np.maximum(size, _LONGEST))[:, None])
+        shorter = np.minimum(1.0, _LONGEST / np.maximum(size, _LONGEST))
+        return np.asarray(step * shorter[:, None])
 
     def _bend_of(self, coefficients: FloatArray, durations: FloatArray) -> FloatArray:
         found = extremes(coefficients, durations)
@@ -176,13 +182,19 @@ class ToolCone:
     def _proof(
         self, coefficients: FloatArray, durations: FloatArray, bend: FloatArray, level: float
     ) -> TiltProof:
-        """Of pieces (P, n, K), (P,) s along which the axis bends by at most `bend` (P,) 1/s^2."""
+        """Of pieces (P, n, K), (P,) s along which the axis bends by at most `bend` (P,) 1/s^2,
+        that the tilt stays below `level` rad.
+
+        A part of a piece is proved from its two ends and from how far the axis may bow between
+        them; what isn't is halved.
+        """
         count = len(durations)
         ok = np.ones(count, dtype=bool)
         time = np.zeros(count)
         piece = np.arange(count)
         begin = np.zeros(count)
         end = durations.astype(np.float64)
+        # sine and cosine of the tilt at both ends of each part, (2, parts)
         first = np.stack(self._sides(_at(coefficients, piece, begin)))
         last = np.stack(self._sides(_at(coefficients, piece, end)))
         largest = -np.inf
@@ -192,11 +204,13 @@ class ToolCone:
             largest = max(largest, float(ends.max(initial=-np.inf)))
             beyond = ends > level
             bow = bend[piece] * np.square(end - begin) / 8.0
-            open_ = ~beyond & ok[piece] & (_bound(first, last, bow, tilt) > level)
+            unproved = _bound(first, last, bow, tilt) > level
+            open_ = ~beyond & ok[piece] & unproved
             for k in np.flatnonzero(beyond):
                 if ok[piece[k]]:
                     ok[piece[k]] = False
-                    time[piece[k]] = begin[k] if portable.arctan2(*first[:, k]) > level else end[k]
+                    is_at_begin = portable.arctan2(*first[:, k]) > level
+                    time[piece[k]] = begin[k] if is_at_begin else end[k]
             open_ &= ok[piece]
             if not open_.any():
                 return TiltProof(ok, time, largest)

@@ -113,17 +113,21 @@ class LawStates(NamedTuple):
 
 
 def law_states(steps: IntArray) -> LawStates:
-    """States of the laws with phases `steps` (K, 7): the first half is integrated from 0, the
-    second back from 1.
+    """States of the laws with phases `steps` (K, 7) of GRID_S each, at the eight instants between
+    the phases (K, 8), and their jerks (K, 7): s goes from 0 to 1, derivatives are per s, s^2, s^3.
+
+    The first half is integrated from 0, the second back from 1: both ends are met exactly.
     """
     t = steps * GRID_S
+    cruise = t[:, 3]
 
     # Durations alone determine the law. Each ramp covers v / 2 times its duration, the cruise v
     # times its own, and all is 1: that gives v. A ramp of phases t0, t1, t0 gains j t0 (t0 + t1) =
     # v.
     rise = t[:, 0] * (t[:, 0] + t[:, 1])
     fall = t[:, 4] * (t[:, 4] + t[:, 5])
-    speed = 1.0 / (0.5 * (2 * t[:, 0] + t[:, 1] + 2 * t[:, 4] + t[:, 5]) + t[:, 3])
+    both_ramps = 2 * t[:, 0] + t[:, 1] + 2 * t[:, 4] + t[:, 5]
+    speed = 1.0 / (0.5 * both_ramps + cruise)
     jerk = np.zeros(steps.shape)
     jerk[:, 0] = speed / rise
     jerk[:, 2] = -speed / rise
@@ -147,14 +151,13 @@ def law_states(steps: IntArray) -> LawStates:
 
     s[:, 7] = 1.0
     for k in (0, 1, 2):
-        s[:, k + 1] = s[:, k] + t[:, k] * (
-            sd[:, k] + t[:, k] * (sdd[:, k] / 2 + jerk[:, k] * t[:, k] / 6)
-        )
+        gained = t[:, k] * (sdd[:, k] / 2 + jerk[:, k] * t[:, k] / 6)
+        s[:, k + 1] = s[:, k] + t[:, k] * (sd[:, k] + gained)
     for k in (6, 5, 4):
-        s[:, k] = s[:, k + 1] - t[:, k] * (
-            sd[:, k + 1] - t[:, k] * (sdd[:, k + 1] / 2 - jerk[:, k] * t[:, k] / 6)
-        )
-    times = np.concatenate([np.zeros((len(t), 1)), np.cumsum(steps, axis=1) * GRID_S], axis=1)
+        gained = t[:, k] * (sdd[:, k + 1] / 2 - jerk[:, k] * t[:, k] / 6)
+        s[:, k] = s[:, k + 1] - t[:, k] * (sd[:, k + 1] - gained)
+    ends = np.cumsum(steps, axis=1) * GRID_S
+    times = np.concatenate([np.zeros((len(t), 1)), ends], axis=1)
     return LawStates(times, s, sd, sdd, jerk)
 
 

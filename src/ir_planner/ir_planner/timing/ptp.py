@@ -101,8 +101,8 @@ def fastest_law(
     if best is None:
         best = _best_law(start, delta, slower, (a, j), limits.torque_share, dynamics)
     if best is None:
-        one = np.ones(1)
-        slow = phase_steps(_limits(slower[-1:], 0.01 * a * one, 0.01 * a * one, j))
+        gentle = np.array([0.01 * a])
+        slow = phase_steps(_limits(slower[-1:], gentle, gentle, j))
         need = _torque_of_laws(dynamics, start, delta, slow).max(axis=(0, 1))
         joint = int(np.argmax(need))
         kept = f", {limits.torque_reserve:g} is its reserve" if limits.torque_reserve > 0.0 else ""
@@ -143,28 +143,39 @@ def _best_law(
     share: float,
     dynamics: Dynamics,
 ) -> TimeLaw | None:
-    """Shortest law over cruising `speeds` (K,) whose torque stays within `share`; None when there
-    is none.
+    """Shortest law over cruising `speeds` (K,) [1/s] whose torque stays within `share`; None when
+    there is none.
+
+    aj: the limits of s'' [1/s^2] and s''' [1/s^3]. For every speed the accelerations of both ramps
+    are found by bisection at once; then all shrink until the whole law fits.
     """
-    a, jerk = aj
+    most, jerk = aj
     count = len(speeds)
-    low = np.full((count, 2), 0.01 * a)
-    high = np.full((count, 2), a)
+
+    def steps_of(accelerations: FloatArray) -> IntArray:
+        """Phases (K, 7) of the laws with accelerations (K, 2) of their ramps."""
+        return phase_steps(_limits(speeds, accelerations[:, 0], accelerations[:, 1], jerk))
+
+    low = np.full((count, 2), 0.01 * most)
+    high = np.full((count, 2), most)
     trial = high
     for k in range(_HALVINGS + 1):
-        steps = phase_steps(_limits(speeds, trial[:, 0], trial[:, 1], jerk))
-        fits = _torque_of_laws(dynamics, start, delta, steps).max(axis=2) <= share
+        use = _torque_of_laws(dynamics, start, delta, steps_of(trial))
+        fits = use.max(axis=2) <= share
         low = np.where(fits, trial, low)
-        high = np.where(fits & (k > 0), high, np.where(fits, a, trial))
+        # the first trial is the limit itself: where it does not fit, it is the upper end
+        high = np.where(fits & (k > 0), high, np.where(fits, most, trial))
         trial = 0.5 * (low + high)
-    steps = phase_steps(_limits(speeds, low[:, 0], low[:, 1], jerk))
+    steps = steps_of(low)
     for _ in range(4):
-        fits_whole = _torque_of_laws(dynamics, start, delta, steps).max(axis=(1, 2)) <= share
+        use = _torque_of_laws(dynamics, start, delta, steps)
+        fits_whole = use.max(axis=(1, 2)) <= share
         if fits_whole.any():
             totals = np.where(fits_whole, steps.sum(axis=1), np.iinfo(np.int64).max)
-            return TimeLaw(tuple(int(k) for k in steps[int(np.argmin(totals))]))
+            shortest = steps[int(np.argmin(totals))]
+            return TimeLaw(tuple(int(k) for k in shortest))
         low = 0.85 * low
-        steps = phase_steps(_limits(speeds, low[:, 0], low[:, 1], jerk))
+        steps = steps_of(low)
     return None
 
 
@@ -202,28 +213,35 @@ def fastest_levels(
 ) -> LevelLaw | None:
     """Shortest law from `start` by `delta` (n,); None where none fits.
 
-    `bounds`: of s' [1/s], s'' and s'''; `share` of the torque envelope that may be used.
+    `bounds`: of s' [1/s], s'' and s'''; `share` of the torque envelope that may be used. For every
+    speed the acceleration of each level is found by bisection; then all shrink until the law fits.
     """
-    speed, a, jerk = bounds
+    speed, most, jerk = bounds
     speeds = speed * _SPEEDS_LEVEL_TIMING
-    low = np.full((len(speeds), 2 * LEVELS), _LOWEST * a)
-    high = np.full_like(low, a)
+
+    def laws_of(accelerations: FloatArray) -> LevelLaws:
+        """Laws with accelerations (K, 2 LEVELS): first those that speed up."""
+        return level_laws(speeds, accelerations[:, :LEVELS], accelerations[:, LEVELS:], jerk)
+
+    low = np.full((len(speeds), 2 * LEVELS), _LOWEST * most)
+    high = np.full_like(low, most)
     trial = high
     for k in range(_HALVINGS + 1):
-        laws = level_laws(speeds, trial[:, :LEVELS], trial[:, LEVELS:], jerk)
-        fits = _levels_fit(laws, start, delta, share, dynamics)
+        fits = _levels_fit(laws_of(trial), start, delta, share, dynamics)
         low = np.where(fits, trial, low)
-        high = np.where(fits & (k > 0), high, np.where(fits, a, trial))
+        # the first trial is the limit itself: where it does not fit, it is the upper end
+        high = np.where(fits & (k > 0), high, np.where(fits, most, trial))
         trial = 0.5 * (low + high)
     for _ in range(6):
-        laws = level_laws(speeds, low[:, :LEVELS], low[:, LEVELS:], jerk)
-        good = _which_keep(laws, bounds) & (
-            _use(laws, start, delta, dynamics).max(axis=(1, 2)) <= share
-        )
+        laws = laws_of(low)
+        use = _use(laws, start, delta, dynamics).max(axis=(1, 2))
+        good = _which_keep(laws, bounds) & (use <= share)
         if good.any():
-            k = int(np.argmin(np.where(good, laws.steps.sum(axis=1), np.iinfo(np.int64).max)))
+            totals = np.where(good, laws.steps.sum(axis=1), np.iinfo(np.int64).max)
+            shortest = int(np.argmin(totals))
             return LevelLaw(
-                tuple(int(t) for t in laws.steps[k]), tuple(float(x) for x in laws.accelerations[k])
+                steps=tuple(int(t) for t in laws.steps[shortest]),
+                accelerations=tuple(float(a) for a in laws.accelerations[shortest]),
             )
         low = _BACK * low
     return None
@@ -238,14 +256,19 @@ def _which_keep(laws: LevelLaws, bounds: tuple[float, float, float]) -> BoolArra
 
 def _use(laws: LevelLaws, start: FloatArray, delta: FloatArray, dynamics: Dynamics) -> FloatArray:
     """Largest use of torque (K, PHASES, P) over the joints, at P instants of every phase."""
-    t = (laws.steps * GRID_S)[:, :, None] * np.linspace(0.0, 1.0, _PER_PHASE_LEVEL_TIMING)
-    a, v, s = (x[:, :-1, None] for x in (laws.accelerations, laws.speeds, laws.path_parameters))
+    shares = np.linspace(0.0, 1.0, _PER_PHASE_LEVEL_TIMING)
+    t = (laws.steps * GRID_S)[:, :, None] * shares
+    a = laws.accelerations[:, :-1, None]
+    v = laws.speeds[:, :-1, None]
+    begin = laws.path_parameters[:, :-1, None]
     j = laws.jerks[:, :, None]
-    here = s + t * (v + t * (a / 2 + j * t / 6))
+    s = begin + t * (v + t * (a / 2 + j * t / 6))
     sd = v + t * (a + j * t / 2)
     sdd = a + j * t
-    flat = [x.reshape(-1, 1) * delta for x in (here, sd, sdd)]
-    use = torque_use(dynamics, start + flat[0], flat[1], flat[2])
+    q = start + s.reshape(-1, 1) * delta
+    qd = sd.reshape(-1, 1) * delta
+    qdd = sdd.reshape(-1, 1) * delta
+    use = torque_use(dynamics, q, qd, qdd)
     return np.asarray(use.max(axis=1).reshape(t.shape))
 
 

@@ -63,7 +63,9 @@ def _knots(points: FloatArray, span: FloatArray) -> tuple[FloatArray, FloatArray
     """q, qd, qdd (M+2, n) at the knots of the spline whose segments last `span` (M+1,) s."""
     from scipy.linalg.lapack import dgtsv
 
-    q = np.concatenate([points[:1], points[:1], points[1:-1], points[-1:], points[-1:]])
+    start = points[:1]
+    goal = points[-1:]
+    q = np.concatenate([start, start, points[1:-1], goal, goal])
     h = span[:, None]
 
     # Continuous speed at knot k: h_{k-1} a_{k-1} + 2 (h_{k-1} + h_k) a_k + h_k a_{k+1} = 6 (s_k -
@@ -81,13 +83,16 @@ def _knots(points: FloatArray, span: FloatArray) -> tuple[FloatArray, FloatArray
     upper = beside.copy()
     lower[0] = 0.0
     upper[-1] = 0.0
+    right = 6.0 * np.diff(slope, axis=0)
     qdd = np.zeros_like(q)
-    qdd[1:-1] = dgtsv(lower, diagonal, upper, 6.0 * np.diff(slope, axis=0))[3]
+    qdd[1:-1] = dgtsv(lower, diagonal, upper, right)[3]
 
     q[1] += np.square(h[0]) * qdd[1] / 6.0
     q[-2] += np.square(h[-1]) * qdd[-2] / 6.0
+    chords = np.diff(q, axis=0) / h
+    at_begin_of_segment = chords - h * (2.0 * qdd[:-1] + qdd[1:]) / 6.0
     qd = np.zeros_like(q)
-    qd[1:-1] = (np.diff(q, axis=0) / h - h * (2.0 * qdd[:-1] + qdd[1:]) / 6.0)[1:]
+    qd[1:-1] = at_begin_of_segment[1:]
     return q, qd, qdd
 
 
