@@ -105,7 +105,9 @@ def configurations_at(
 def _begun(
     layers: Layers, path: ToolPath, free_angle: float, space: FreeSpace, start: FloatArray
 ) -> Layers:
-    """The layers with one configuration in the first: the start."""
+    """The layers with one configuration in the first: the start (n,). PathRefusedError where the
+    tcp isn't at the begin of the path there; turned about its axis by at most `free_angle` rad.
+    """
     wanted = path.poses(layers.s[:1])[0]
     there = space.scene.chain.tcp_poses(start[None])[0]
     away = float(portable.norm(there[:3, 3] - wanted[:3, 3]))
@@ -113,19 +115,21 @@ def _begun(
     angle = float(portable.arctan2(turned[2, 1], turned[1, 1]))
     tilt = float(portable.arccos(np.clip(turned[0, 0], -1.0, 1.0)))
     if away > _START_M or tilt > _START_RAD or abs(angle) > free_angle + _START_RAD:
+        off_deg = np.degrees(max(tilt, abs(angle)))
         raise PathRefusedError(
             f"the tcp of start is {away * 1e3:.3g} mm and "
-            f"{np.degrees(max(tilt, abs(angle))):.3g} deg from where the path begins: it must be "
+            f"{off_deg:.3g} deg from where the path begins: it must be "
             f"within {_START_M * 1e3:g} mm and {np.degrees(_START_RAD):.2g} deg",
             StatusCode.START_STATE_INVALID,
         )
     later = layers.layer > 0
+    is_free = space.states_free(start[None])
     return replace(
         layers,
         q=np.concatenate([start[None], layers.q[later]]),
         layer=np.concatenate([[0], layers.layer[later]]),
         angle=np.concatenate([[angle], layers.angle[later]]),
-        free=np.concatenate([space.states_free(start[None]), layers.free[later]]),
+        free=np.concatenate([is_free, layers.free[later]]),
     )
 
 
@@ -300,38 +304,43 @@ def chains(
     """
     nodes = np.flatnonzero(layers.free)
     scene = space.scene
+    count = len(layers.s)
     q = layers.q[nodes]
     layer = layers.layer[nodes]
     turning = layers.turning
-    before, after = _neighbours(q, layer, turning, np.diff(layers.s) > wide if wide else None)
+    gaps = np.diff(layers.s)
+    before, after = _neighbours(q, layer, turning, gaps > wide if wide else None)
     family = _families(len(q), before, after)
-    seconds = (np.diff(layers.s) / speed)[layer[before]]
+    seconds = (gaps / speed)[layer[before]]
     steps = difference(q[before], q[after], turning)
     joules = _edge_joules(q[before], steps, seconds, scene)
     jumps = np.flatnonzero(np.abs(steps).max(axis=1) > JUMP)
     if len(jumps):  # only where samples could be closer; any jump costs more than none
-        joules = np.minimum(joules, _A_JUMP / len(layers.s))
+        joules = np.minimum(joules, _A_JUMP / count)
         joules[jumps] = _A_JUMP * (1.0 + _strays(q[before[jumps]], steps[jumps], scene))
     apart = _SAME if len(np.unique(layers.angle)) == 1 else _APART
     if by_start:  # the same edges from the end
-        before, after, layer = after, before, len(layers.s) - 1 - layer
+        layer = count - 1 - layer
+        before, after = after, before
         order = np.lexsort((before, after, layer[after]))
         before = before[order]
         after = after[order]
         joules = joules[order]
-    cost, parent = _cheapest(layer, before, after, joules, len(layers.s))
-    last = np.flatnonzero((layer == len(layers.s) - 1) & np.isfinite(cost))
+    cost, parent = _cheapest(layer, before, after, joules, count)
+    is_reached = np.isfinite(cost)
+    last = np.flatnonzero((layer == count - 1) & is_reached)
     if len(last) == 0:
-        raise NoChainError(nodes[np.isfinite(cost)])
+        raise NoChainError(nodes[is_reached])
     found: list[ConfigurationChain] = []
     for node in _different(last, cost, q, family, scene, (apart, most)):
         trace = [int(node)]
         while parent[trace[-1]] >= 0:
             trace.append(int(parent[trace[-1]]))
         order = nodes[trace if by_start else trace[::-1]]
-        found.append(
-            ConfigurationChain(layers.s, layers.q[order], layers.angle[order], float(cost[node]))
+        chain = ConfigurationChain(
+            layers.s, layers.q[order], layers.angle[order], float(cost[node])
         )
+        found.append(chain)
     return found
 
 

@@ -261,23 +261,32 @@ def timed(
     whole = asked.whole
     scene = asked.context.scene
     angle, chain = angle_along(whole, chain, path.free_angle, asked.space, asked.fixed)
-    ends = whole.strokes
-    curves = [curve_of(whole, chain, angle, (whole.ends[a], whole.ends[b]), scene) for a, b in ends]
+    curves = []
+    for first, last in whole.strokes:
+        span = (whole.ends[first], whole.ends[last])
+        curves.append(curve_of(whole, chain, angle, span, scene))
     slower = _flange_share(asked, curves) if asked.t1 else 1.0
-    along = [_spans(whole, a, b, slower * asked.rate) for a, b in ends]
+    along = [_spans(whole, first, last, slower * asked.rate) for first, last in whole.strokes]
+    any_speed = path.speed_tolerance >= 1.0
     paths: list[DrivenPath] = []
 
+    def stroke_of(
+        curve: JointCurve, spans: tuple[StrokeSpan, ...], limits: MotionLimits
+    ) -> TimedStroke:
+        """One stroke from rest to rest, at the speeds of its spans where they are asked for."""
+        if any_speed:
+            return unhurried(curve, spans, limits, scene).stretched(max(asked.rate, 1.0))
+        return timed_stroke(curve, spans, path.speed_tolerance, limits, scene, longer=longer)
+
     def within(limits: MotionLimits) -> Movement:
+        """The movement within other limits; `paths` keeps what belongs to it."""
         limits = limits.scaled(share, share)
         strokes = tuple(
-            unhurried(curve, spans, limits, scene).stretched(max(asked.rate, 1.0))
-            if path.speed_tolerance >= 1.0
-            else timed_stroke(curve, spans, path.speed_tolerance, limits, scene, longer=longer)
-            for curve, spans in zip(curves, along, strict=True)
+            stroke_of(curve, spans, limits) for curve, spans in zip(curves, along, strict=True)
         )
         _check_duration(sum(stroke.duration for stroke in strokes), asked)
         points = sent(strokes, limits, scene)
-        if path.speed_tolerance >= 1.0:
+        if any_speed:
             points = _as_slow_as_sent(points, limits, scene)
         movement = Movement(chain.q, points.trajectory, asked.context, fixed_time=True)
         paths.append(DrivenPath(movement, points, angle, chain, slower, longer))

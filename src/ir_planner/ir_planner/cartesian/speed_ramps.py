@@ -81,25 +81,28 @@ def law_of(spans: tuple[StrokeSpan, ...], ramps: FloatArray) -> SpeedLaw:
     """From rest to rest; ramps (K + 1,) s: how long the changes of speed take at the ends of the
     spans.
 
-    Raises TooShortError.
+    The faster of two spans gives the place for the ramp between them. Raises TooShortError.
     """
     speeds = np.array([0.0, *(span.speed for span in spans), 0.0])
     covered = 0.5 * (speeds[1:] + speeds[:-1]) * ramps
     phases: list[tuple[float, float, float, bool]] = []
     for k, span in enumerate(spans):
-        rise = speeds[k] < speeds[k + 1]
-        fall = speeds[k + 2] < speeds[k + 1]
-        left = span.length - (covered[k] if rise else 0.0) - (covered[k + 1] if fall else 0.0)
+        before = speeds[k]
+        own = speeds[k + 1]
+        after = speeds[k + 2]
+        rises = before < own
+        falls = after < own
+        left = span.length - (covered[k] if rises else 0.0) - (covered[k + 1] if falls else 0.0)
         if left < 0.0:
             raise TooShortError(k, -left)
-        if rise:
-            phases.append((ramps[k], speeds[k], span.speed, False))
+        if rises:
+            phases.append((ramps[k], before, span.speed, False))
         phases.append((left / span.speed, span.speed, span.speed, span.kept))
-        if fall:
-            phases.append((ramps[k + 1], span.speed, speeds[k + 2], False))
-    kept = [phase for phase in phases if phase[0] > 1e-9]
-    duration, first, last, even = (np.array(column) for column in zip(*kept, strict=True))
-    return SpeedLaw(duration, first, last, even.astype(bool))
+        if falls:
+            phases.append((ramps[k + 1], span.speed, after, False))
+    lasting = [phase for phase in phases if phase[0] > 1e-9]
+    durations, firsts, lasts, kept = zip(*lasting, strict=True)
+    return SpeedLaw(np.array(durations), np.array(firsts), np.array(lasts), np.array(kept, bool))
 
 
 def ramp_places(
@@ -245,21 +248,26 @@ def _ramps_use(
     limits: MotionLimits,
     scene: PlanningScene,
 ) -> tuple[FloatArray, FloatArray]:
-    """What ramps of these durations (R,) s need of the limits (R,), and the constant speed there
-    (R,).
+    """What ramps of these durations (R,) s at the begin of span k need of the limits (R,), and the
+    constant speed there (R,). Speeds in m/s; the speed of a ramp is a cubic without acceleration at
+    its ends.
     """
     begin, first, last = ramp_places(spans, k, durations)
     x = np.linspace(0.0, 1.0, PER_RAMP)
     T = durations[:, None]
     rise = last - first
-    s = curve.begin + begin[:, None] + T * x * (first + rise * (x * x) * (1.0 - 0.5 * x))
+    covered = T * x * (first + rise * (x * x) * (1.0 - 0.5 * x))
+    s = curve.begin + begin[:, None] + covered
     v = np.broadcast_to(first + rise * (x * x) * (3.0 - 2.0 * x), s.shape)
     a = rise / T * 6.0 * x * (1.0 - x)
     j = rise / (T * T) * (6.0 - 12.0 * x)
+
     none = np.zeros(s.size)
     places = s.ravel()
     even = np.full(s.size, max(first, last))
     along = curve.at(np.clip(places, curve.begin, curve.end))
-    ramp = use_of(with_speed(along, none, places, v.ravel(), a.ravel(), j.ravel()), limits, scene)
-    cruise = use_of(with_speed(along, none, places, even, none, none), limits, scene)
+    in_ramp = with_speed(along, none, places, v.ravel(), a.ravel(), j.ravel())
+    at_speed = with_speed(along, none, places, even, none, none)
+    ramp = use_of(in_ramp, limits, scene)
+    cruise = use_of(at_speed, limits, scene)
     return ramp.reshape(s.shape).max(axis=1), cruise.reshape(s.shape).max(axis=1)

@@ -269,13 +269,16 @@ class ToolPath:
         """Angle of the path about the tool's axis over u, 0 at the start. PathRefusedError where it
         runs along that axis.
         """
-        ends = self._clipped(np.array([-np.inf, np.inf]))
-        inner = self.corners + np.linspace(-1.0, 1.0, 33)[:, None] * self.radius
-        even = np.linspace(ends[0], ends[1], 40 * len(self.parts) + 200)
-        u = _distinct_values(np.clip(np.concatenate([even, inner.ravel()]), ends[0], ends[1]))
-        tangents = self.tangents(np.minimum(u, ends[1] - 1e-9))
+        begin, end = self._clipped(np.array([-np.inf, np.inf]))
+        # denser around the corners, where the path turns
+        around_corners = self.corners + np.linspace(-1.0, 1.0, 33)[:, None] * self.radius
+        even = np.linspace(begin, end, 40 * len(self.parts) + 200)
+        places = np.concatenate([even, around_corners.ravel()])
+        u = _distinct_values(np.clip(places, begin, end))
+        before_end = np.minimum(u, end - 1e-9)
+        tangents = self.tangents(before_end)
         given = np.tile(np.eye(4), (len(u), 1, 1))
-        for k, chosen in self._owners(np.minimum(u, ends[1] - 1e-9)):
+        for k, chosen in self._owners(before_end):
             given[chosen] = self._of_part(k, u[chosen])
         local = np.einsum("mji,mj->mi", given[:, :3, :3], tangents)
         local /= np.linalg.norm(local, axis=1)[:, None]

@@ -37,6 +37,18 @@ _SPARSE = 40  # places of the path for the weight of an objective
 _GAIN = 1e-5  # share of the value that ten steps must gain together
 
 
+def _shares(knots: FloatArray) -> FloatArray:
+    """Shares of a duration at which a path is sampled: the trajectory's own knots (N,), which it
+    passes exactly, and even ones between that are not too near to these.
+    """
+    even = np.linspace(0.0, 1.0, _PLACES)
+    after = np.searchsorted(knots, even)
+    next_knot = knots[np.clip(after, 1, len(knots) - 1)]
+    previous_knot = knots[np.clip(after - 1, 0, None)]
+    near = np.minimum(np.abs(next_knot - even), np.abs(previous_knot - even))
+    return np.sort(np.concatenate([knots, even[near > _APART / _PLACES]]))
+
+
 class FixedPath:
     """p(s), s in [0, 1], from the points (N, n) that a trajectory passes."""
 
@@ -45,16 +57,13 @@ class FixedPath:
         span = given.duration - float(given.times[0])
         self.duration = span
         knots = (given.times - begin) / span
-        places = np.linspace(0.0, 1.0, _PLACES)
-        near = np.abs(knots[np.clip(np.searchsorted(knots, places), 1, len(knots) - 1)] - places)
-        near = np.minimum(
-            near, np.abs(knots[np.clip(np.searchsorted(knots, places) - 1, 0, None)] - places)
-        )
-        self._share = np.sort(np.concatenate([knots, places[near > _APART / _PLACES]]))
+        self._share = _shares(knots)
         motion = given.sample(begin + self._share * span)
         q = motion.q
         q[0] = given.positions[0]
         q[-1] = given.positions[-1]
+
+        # s grows with the length of the path, and a little with time: it does not stand still
         speed = np.linalg.norm(motion.qd, axis=1)
         density = speed + _STANDING * speed.mean()
         middle = 0.5 * (density[1:] + density[:-1])
@@ -66,7 +75,8 @@ class FixedPath:
         begins = breaks[:-1]
         cubics = [spline(begins), spline(begins, 1), spline(begins, 2) / 2, spline(begins, 3) / 6]
         self.cubics = CubicPath(breaks, np.stack(cubics))
-        self._passed = np.interp(knots[_in_order(given.positions, points)], self._share, self._s)
+        at_points = knots[_in_order(given.positions, points)]
+        self._passed = np.interp(at_points, self._share, self._s)
 
     def at(self, s: FloatArray) -> FloatArray:
         """p (N, n) rad at s (N,) in [0, 1]."""

@@ -149,54 +149,63 @@ def _refusal(stopping: str, context: Context) -> Status:
 
 def check_driveable(end: MovingEnd, context: Context) -> None:
     """Raise RequestError where no movement within the limits begins with this motion."""
-    limits = context.limits
     robot = context.scene.cell.robot
-    turned = "goes on" if end.what == "start" else "comes"
-    for j, name in enumerate(robot.joint_names):
-        v = float(end.qd[j])
-        a = float(end.qdd[j])
-        unit = "rad" if j >= robot.base else "m"
-        bounds = (
-            (abs(v), limits.velocity[j], "velocity", f"{unit}/s"),
-            (abs(a), limits.acceleration[j], "acceleration", f"{unit}/s^2"),
-        )
-        for value, bound, kind, of_it in bounds:
-            if not value <= bound * (1.0 + _SLACK):
-                raise _undriveable(
-                    end,
-                    f"{name} has {kind} {value:.6g} {of_it}: it must be at most {bound:.6g} "
-                    f"{of_it}, exceeded by {value - bound:.3g} {of_it}",
-                )
-        rising = abs(v) + a * a / (2.0 * limits.jerk[j]) if a * v > 0.0 else 0.0
-        if rising > limits.velocity[j] * (1.0 + _SLACK):
-            raise _undriveable(
-                end,
-                f"{name} has velocity {abs(v):.6g} {unit}/s and acceleration {abs(a):.6g} "
-                f"{unit}/s^2, which falls with {limits.jerk[j]:g} {unit}/s^3: it reaches "
-                f"{rising:.6g} {unit}/s, it must be at most {limits.velocity[j]:.6g} {unit}/s",
-            )
-        for side, limit in ((1.0, robot.position_max[j]), (-1.0, robot.position_min[j])):
-            needed = stopping_distance(
-                side * v, side * a, float(limits.acceleration[j]), float(limits.jerk[j])
-            )
-            left = side * (float(limit) - float(end.q[j]))
-            if needed > left + _POSITION:
-                raise _undriveable(
-                    end,
-                    f"{name} {turned} {robot.shown(j, needed, 4)} with {abs(v):.4g} {unit}/s, "
-                    f"however it brakes: {robot.shown(j, left, 4)} are left to its limit of "
-                    f"{robot.shown(j, limit)}",
-                )
+    for joint in range(len(robot.joint_names)):
+        _check_joint(end, joint, context)
     most = 1.0 - context.scene.drives.torque_reserve
     forwards = end.qd if end.what == "start" else -end.qd
     use = torque_use(context.scene.dynamics, end.q[None], forwards[None], end.qdd[None])[0]
-    j = int(np.argmax(use))
-    if use[j] > most * (1.0 + _SLACK):
+    heaviest = int(np.argmax(use))
+    if use[heaviest] > most * (1.0 + _SLACK):
         raise _undriveable(
             end,
-            f"{robot.joint_names[j]} needs {use[j]:.4g} of its torque there: at most {most:.4g} "
-            "may be used",
+            f"{robot.joint_names[heaviest]} needs {use[heaviest]:.4g} of its torque there: at most "
+            f"{most:.4g} may be used",
         )
+
+
+def _check_joint(end: MovingEnd, j: int, context: Context) -> None:
+    """Raise RequestError where one joint exceeds its limits there, or can't but exceed them soon:
+    its acceleration falls with the jerk limit, and it brakes before its end of travel.
+    """
+    limits = context.limits
+    robot = context.scene.cell.robot
+    name = robot.joint_names[j]
+    v = float(end.qd[j])
+    a = float(end.qdd[j])
+    unit = "rad" if j >= robot.base else "m"
+    bounds = (
+        (abs(v), limits.velocity[j], "velocity", f"{unit}/s"),
+        (abs(a), limits.acceleration[j], "acceleration", f"{unit}/s^2"),
+    )
+    for value, bound, kind, of_it in bounds:
+        if not value <= bound * (1.0 + _SLACK):
+            raise _undriveable(
+                end,
+                f"{name} has {kind} {value:.6g} {of_it}: it must be at most {bound:.6g} "
+                f"{of_it}, exceeded by {value - bound:.3g} {of_it}",
+            )
+    rising = abs(v) + a * a / (2.0 * limits.jerk[j]) if a * v > 0.0 else 0.0
+    if rising > limits.velocity[j] * (1.0 + _SLACK):
+        raise _undriveable(
+            end,
+            f"{name} has velocity {abs(v):.6g} {unit}/s and acceleration {abs(a):.6g} "
+            f"{unit}/s^2, which falls with {limits.jerk[j]:g} {unit}/s^3: it reaches "
+            f"{rising:.6g} {unit}/s, it must be at most {limits.velocity[j]:.6g} {unit}/s",
+        )
+    turned = "goes on" if end.what == "start" else "comes"
+    for side, limit in ((1.0, robot.position_max[j]), (-1.0, robot.position_min[j])):
+        needed = stopping_distance(
+            side * v, side * a, float(limits.acceleration[j]), float(limits.jerk[j])
+        )
+        left = side * (float(limit) - float(end.q[j]))
+        if needed > left + _POSITION:
+            raise _undriveable(
+                end,
+                f"{name} {turned} {robot.shown(j, needed, 4)} with {abs(v):.4g} {unit}/s, "
+                f"however it brakes: {robot.shown(j, left, 4)} are left to its limit of "
+                f"{robot.shown(j, limit)}",
+            )
 
 
 def _undriveable(end: MovingEnd, sentence: str) -> RequestError:

@@ -155,17 +155,19 @@ def distance_at_most(body: Body, points: FloatArray) -> FloatArray:
     if body.kind == "plane":
         return np.asarray(np.maximum(z, 0.0))
     if body.kind == "box":
-        return np.asarray(np.linalg.norm(np.maximum(np.abs(local) - 0.5 * body.size, 0.0), axis=-1))
+        outside = np.maximum(np.abs(local) - 0.5 * body.size, 0.0)
+        return np.asarray(np.linalg.norm(outside, axis=-1))
     if body.kind == "mesh":
-        return np.asarray(
-            np.min([np.linalg.norm(local - v, axis=-1) for v in body.vertices], axis=0)
-        )
+        from_vertices = [np.linalg.norm(local - vertex, axis=-1) for vertex in body.vertices]
+        return np.asarray(np.min(from_vertices, axis=0))
     radius, length, _ = body.size
+    beyond_ends = np.maximum(np.abs(z) - 0.5 * length, 0.0)
     if body.kind == "cylinder":
         beside = np.maximum(_hypot(x, y) - radius, 0.0)
-        return np.asarray(_hypot(beside, np.maximum(np.abs(z) - 0.5 * length, 0.0)))
-    above = np.maximum(np.abs(z) - 0.5 * length, 0.0) if body.kind == "capsule" else z
-    return np.asarray(np.maximum(np.sqrt(x * x + y * y + above * above) - radius, 0.0))
+        return np.asarray(_hypot(beside, beyond_ends))
+    above = beyond_ends if body.kind == "capsule" else z
+    from_core = np.sqrt(x * x + y * y + above * above)
+    return np.asarray(np.maximum(from_core - radius, 0.0))
 
 
 def _box_around(
@@ -224,6 +226,9 @@ class EndEnclosure(NamedTuple):
 def enclosure(ends: Ends, space: FreeSpace) -> EndEnclosure | None:
     """What proves that no path leads from the start to any of the goals; None: nothing is proved,
     as ever on a rail, whose reach isn't followed.
+
+    A ball inside of the arm that can't get from where it is at the start to where it is at a goal
+    proves it. The largest ball that could is found by bisection: it says how much is missing.
     """
     scene = space.scene
     if scene.chain.first_slides:
@@ -236,29 +241,36 @@ def enclosure(ends: Ends, space: FreeSpace) -> EndEnclosure | None:
     reach = Reach.of(scene.cell.robot, scene.cell.base_pose)
     beyond = [reach.beyond_circle(ball.link, float(portable.norm(ball.point))) for ball in balls]
     lengths = np.array([kept[body.name] for body in bodies])
-    field = BallField.of(bodies, lengths, reach, max(beyond), max(ball.radius for ball in balls))
+    largest = max(ball.radius for ball in balls)
+    field = BallField.of(bodies, lengths, reach, farthest=max(beyond), most=largest)
     links = scene.chain.link_poses(np.concatenate([ends.start[None], ends.goals]))
     for ball, farthest in zip(balls, beyond, strict=True):
-        cubes = [
-            field.cube(portable.matmul(pose[:3, :3], ball.point) + pose[:3, 3])
-            for pose in links[:, ball.link]
-        ]
+        cubes = []  # of the field, in which the ball is at the start and at the goals
+        for pose in links[:, ball.link]:
+            centre = portable.matmul(pose[:3, :3], ball.point) + pose[:3, 3]
+            cubes.append(field.cube(centre))
         if _is_joined(field, ball.radius, farthest, cubes):
             continue
         low = 0.0
         high = ball.radius
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            low, high = (
-                (middle, high) if _is_joined(field, middle, farthest, cubes) else (low, middle)
-            )
+            if _is_joined(field, middle, farthest, cubes):
+                low = middle
+            else:
+                high = middle
         part = field.components(high, farthest)
-        start, goal = (part == part[cube] for cube in cubes[:2])
-        end, inside = ("goal", goal) if goal.sum() <= start.sum() else ("start", start)
-        number = field.beside_widest_exit(inside)
-        clearance = float(lengths[number]) + low - ball.radius
+        around_start = part == part[cubes[0]]
+        around_goal = part == part[cubes[1]]
+        is_goal_smaller = around_goal.sum() <= around_start.sum()
+        number = field.beside_widest_exit(around_goal if is_goal_smaller else around_start)
+        needed = float(lengths[number])
         return EndEnclosure(
-            end, ball.capsule, bodies[number].name, clearance, float(lengths[number])
+            end="goal" if is_goal_smaller else "start",
+            capsule=ball.capsule,
+            body=bodies[number].name,
+            clearance=needed + low - ball.radius,
+            needed=needed,
         )
     return None
 

@@ -154,17 +154,21 @@ def colliding_stretch(
     first = np.concatenate([[0], np.cumsum(counts)])  # index of each waypoint among the samples
     step = np.repeat(np.arange(len(counts)), counts)
     share = (np.arange(len(step)) - first[step]) / counts[step]
-    points = np.concatenate(
-        [path[step] + share[:, None] * (path[step + 1] - path[step]), path[-1:]]
-    )
+    inner = path[step] + share[:, None] * (path[step + 1] - path[step])
+    points = np.concatenate([inner, path[-1:]])
     space.work.spend(batch_work(len(points)))
     free = space.states_free(points)
-    blocked = ~(free[:-1] & free[1:])  # (K,): the parts between samples
+
+    # parts between samples (K,): a proof may fail between two samples that are free
+    blocked = ~(free[:-1] & free[1:])
     unproved = np.flatnonzero(proof.verdict != FREE)
     middle = 0.5 * (proof.t0 + proof.t1)[unproved] * counts[unproved]
-    blocked[first[unproved] + np.minimum(middle.astype(int), counts[unproved] - 1)] = True
+    part_of_step = np.minimum(middle.astype(int), counts[unproved] - 1)
+    blocked[first[unproved] + part_of_step] = True
     begin = int(np.argmax(blocked))
     end = begin + int(np.argmin(np.append(blocked[begin:], False)))
+
+    # wider by the margin, and on to the next free samples
     wider = int(np.ceil(margin * (end - begin)))
     begin = max(begin - wider, 0)
     end = min(end + wider, len(points) - 1)
@@ -213,16 +217,18 @@ def _colliding_parts(straight: FloatArray, space: FreeSpace) -> list[FloatArray]
     """
     begin = straight[0]
     step = straight[1] - straight[0]
-    count = max(int(np.ceil(np.abs(step).max() / _SPACING_CORRECTION_LOG)), 1)
-    share = np.linspace(0.0, 1.0, count + 1)
+    pieces = int(np.ceil(np.abs(step).max() / _SPACING_CORRECTION_LOG))
+    share = np.linspace(0.0, 1.0, max(pieces, 1) + 1)
     blocked = ~space.states_free(begin + share[:, None] * step)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], blocked, [False]]).astype(np.int8)))
-    shares = [
-        (share[first], share[last - 1]) for first, last in zip(edges[::2], edges[1::2], strict=True)
-    ]
+    with_free_ends = np.concatenate([[False], blocked, [False]])
+    edges = np.flatnonzero(np.diff(with_free_ends.astype(np.int8)))
+    shares = []
+    for first, after_last in zip(edges[::2], edges[1::2], strict=True):
+        shares.append((share[first], share[after_last - 1]))
     if not shares:
         proof = space.scene.collision.certify_edges(straight[:1], straight[1:], space.threshold)
-        shares = [(float(proof.t0[0]), float(proof.t1[0]))] if proof.verdict[0] != FREE else []
+        if proof.verdict[0] != FREE:
+            shares.append((float(proof.t0[0]), float(proof.t1[0])))
     return [begin + np.array(ends)[:, None] * step for ends in shares]
 
 

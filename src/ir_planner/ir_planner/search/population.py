@@ -344,30 +344,41 @@ class _Breeder:
         return people.of(rows.ravel())
 
     def _next(self, people: _Individuals) -> _Individuals:
-        """One generation: the elite stays, the rest are children of tournament winners."""
+        """One generation: the elite stays, the rest are children of tournament winners.
+
+        `people` are sorted by island, and within it by fitness; so is the answer.
+        """
         s = self.settings
         rng = self.rng
         n = len(self.a)
-        islands = s.islands
         per = self.per_island
         children = self.per_island - self.elite
-        base = per * np.arange(islands)[:, None]
-        # islands are sorted by fitness: the lowest of some random places wins a tournament
-        won = rng.integers(0, per, (2, islands, children, s.tournament)).min(axis=3) + base
+        first_of_island = per * np.arange(s.islands)[:, None]
+
+        # the lowest of some random places, which is the fittest, wins a tournament
+        drawn = rng.integers(0, per, (2, s.islands, children, s.tournament))
+        won = drawn.min(axis=3) + first_of_island
         mother, father = won.reshape(2, -1)
         count = len(mother)
+
+        # crossover: joint by joint a place on the line through both parents
         vias = people.vias[mother]
         crossed = rng.random(count) < s.crossover
         share = rng.uniform(-_BEYOND, 1.0 + _BEYOND, (count, 1, n)) * crossed[:, None, None]
         child = vias + share * (people.vias[father] - vias)
-        child += self._parting(people, mother) * (rng.random(count) < s.parting)[:, None, None]
+        away = self._parting(people, mother)
+        child += away * (rng.random(count) < s.parting)[:, None, None]
+
+        # mutation, whose deviation is inherited and mutates itself
         spread = people.spread[mother] * portable.exp(s.adaptation * rng.standard_normal(count))
         spread = np.clip(spread, s.mutation_least, _LARGEST)
-        noise = rng.standard_normal((count, 1, n)) + _OWN * rng.standard_normal(vias.shape)
+        together = rng.standard_normal((count, 1, n))
+        noise = together + _OWN * rng.standard_normal(vias.shape)
         mutated = rng.random((count, 1, n)) < s.mutated_share
         child += spread[:, None, None] * noise * mutated
         child = np.clip(child, self.space.low, self.space.high)
-        stay = (base + np.arange(self.elite)).ravel()
+
+        stay = (first_of_island + np.arange(self.elite)).ravel()
         both = _Individuals.joined(people.of(stay), self.evaluated(child, spread))
         island = np.concatenate([stay // per, np.arange(count) // children])
         return self._ranked(both.of(np.argsort(island, kind="stable")), per)

@@ -258,11 +258,14 @@ class _Sbl:
         return self._tested(_Bridge(ends))
 
     def _tested(self, bridge: _Bridge) -> FloatArray | None:
-        """The path from the start over the bridge to a goal; None where an edge is blocked, which
-        is taken out.
+        """The path (M, n) from the start over the bridge to a goal; None where an edge is blocked,
+        which is taken out.
+
+        Lazily: the longest piece that isn't checked yet is halved first, as a collision is most
+        likely in it. An edge at level L is checked at 2^L - 1 places; trees remember the levels.
         """
         trees = self._trees
-        (left, right) = bridge.ends
+        left, right = bridge.ends
         back = trees.to_root(left)
         on = trees.to_root(right)
         nodes = [*back[::-1], *on]
@@ -270,14 +273,18 @@ class _Sbl:
         owners = [*back[-2::-1], -1, *on[:-1]]
         q = self._q(nodes)
         length = np.abs(np.diff(q, axis=0)).max(axis=1)
-        level = np.array([bridge.tested if owner < 0 else trees.tested[owner] for owner in owners])
+        levels = [bridge.tested if owner < 0 else trees.tested[owner] for owner in owners]
+        level = np.array(levels)
         while not self.space.work.exhausted:
-            piece = np.where(level < _CERTIFIED, length / (1 << np.minimum(level, 60)), 0.0)
+            unchecked = length / (1 << np.minimum(level, 60))
+            piece = np.where(level < _CERTIFIED, unchecked, 0.0)
             k = int(piece.argmax())
             if piece[k] <= self.settings.resolution:
                 break
-            shares = np.arange(1, 2 ** (level[k] + 1), 2) / 2 ** (level[k] + 1)
-            if not self._free(q[k] + shares[:, None] * (q[k + 1] - q[k])).all():
+            parts = 2 ** (level[k] + 1)
+            shares = np.arange(1, parts, 2) / parts
+            places = q[k] + shares[:, None] * (q[k + 1] - q[k])
+            if not self._free(places).all():
                 self._cut(owners[k], bridge)
                 return None
             level[k] += 1

@@ -109,16 +109,23 @@ def _best_pull(
         alone = via.copy()
         alone[joint] = inside[joint]
         targets.append(alone)
+    places: list[FloatArray] = []
+    for target in targets:
+        places.extend(via + share * (target - via) for share in _PULLS)
+    trials = np.array(places)
 
     # only what costs less is certified
-    trials = np.array([via + share * (target - via) for target in targets for share in _PULLS])
     cost = movement_cost(weights, before, trials) + movement_cost(weights, trials, after)
     now = float(movement_cost(weights, before, via) + movement_cost(weights, via, after))
-    trials = trials[cost < now - 1e-9]
-    cost = cost[cost < now - 1e-9]
+    cheaper = cost < now - 1e-9
+    trials = trials[cheaper]
+    cost = cost[cheaper]
     if len(trials) == 0:
         return via
     count = len(trials)
-    ends = np.repeat(np.stack([before, after]), count, axis=0)
-    free = space.edges_free(ends, np.concatenate([trials, trials])).reshape(2, count).all(axis=0)
-    return trials[int(np.argmin(np.where(free, cost, np.inf)))] if free.any() else via
+    neighbours = np.repeat(np.stack([before, after]), count, axis=0)
+    edges = space.edges_free(neighbours, np.concatenate([trials, trials]))
+    free = edges.reshape(2, count).all(axis=0)
+    if not free.any():
+        return via
+    return trials[int(np.argmin(np.where(free, cost, np.inf)))]

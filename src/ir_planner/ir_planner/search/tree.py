@@ -169,13 +169,16 @@ class _Search:
 
     def _walked(self, tree: _Tree, targets: FloatArray, steps: int) -> tuple[list[int], BoolArray]:
         """The last new node of a walk from the tree's nearest node to each of targets (M, n), -1
-        where it made no step; and which walks arrived.
+        where it made no step; and which walks arrived. Of a walk that begins at its target it is
+        the node there.
+
+        All walks take a step at once: states and edges are checked in batches.
         """
         space = self._space
-        node, _ = tree.nearest(targets)
-        at = [int(k) for k in node]
+        nearest, _ = tree.nearest(targets)
+        at = [int(node) for node in nearest]
         last = [-1] * len(targets)
-        here = tree.nodes[node].copy()
+        here = tree.nodes[nearest].copy()
         met = np.zeros(len(targets), dtype=bool)
         active = np.arange(len(targets))
         for _ in range(steps):
@@ -185,15 +188,17 @@ class _Search:
             length = self._length(gap)
             final = length <= self._step
             share = np.where(final, 1.0, self._step / np.maximum(length, self._step))
-            following = np.where(
-                final[:, None], targets[active], here[active] + share[:, None] * gap
-            )
+            partial = here[active] + share[:, None] * gap
+            following = np.where(final[:, None], targets[active], partial)
             following = np.clip(following, space.low, space.high)
             following[~final] = self._cone.brought_in(
                 following[~final], space.low, space.high, self._scale
             )
+
+            # walks go on that come closer and whose step is free
             left = self._length(targets[active] - following)
-            going = (final & (length > 0.0)) | (left < length - _CLOSER * self._step)
+            closer = left < length - _CLOSER * self._step
+            going = (final & (length > 0.0)) | closer
             met[active[final & (length == 0.0)]] = True
             going[going] = space.states_free(following[going])
             rows = np.flatnonzero(going)
@@ -206,7 +211,10 @@ class _Search:
                 here[lane] = following[k]
                 met[lane] = bool(final[k])
             active = active[going & ~final]
-        return [k if k >= 0 else at[lane] if met[lane] else -1 for lane, k in enumerate(last)], met
+        for lane, node in enumerate(last):
+            if node < 0 and met[lane]:
+                last[lane] = at[lane]
+        return last, met
 
     def _length(self, gap: FloatArray) -> FloatArray:
         scaled = gap * self._scale
