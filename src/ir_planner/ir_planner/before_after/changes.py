@@ -145,25 +145,40 @@ def saving(before: Costed, after: Costed) -> Saving:
 def side_of(
     name: str, cycle_time: float, program: Costed, request: ProgramRequest, against: Costed
 ) -> Side:
-    """A side with the intervals of its energies, its power over time and what it saves."""
+    """A side with the intervals of its energies [J], its power over time and what it saves of the
+    energy of `against`. cycle_time [s].
+    """
     parameters = request.settings.drives(request.cell.robot).parameters
-    steps = tuple(
-        replace(step, report=replace(step.report, energy_low=within.low, energy_high=within.high))
-        for step, added in zip(program.steps, program.added, strict=True)
-        for within in [interval(step.report.energy, added)]
-    )
-    elapsed = np.cumsum([0.0, *(step.duration for step in steps)])[:-1]
-    report = total_report(tuple(step.report for step in steps), tuple(elapsed.tolist()))
+    widened = []
+    for step, added in zip(program.steps, program.added, strict=True):
+        within = interval(step.report.energy, added)
+        report = replace(step.report, energy_low=within.low, energy_high=within.high)
+        widened.append(replace(step, report=report))
+    steps = tuple(widened)
+    ends = np.cumsum([0.0, *(step.duration for step in steps)])
+    begins = tuple(ends[:-1].tolist())
+    report = total_report(tuple(step.report for step in steps), begins)
     whole = interval(report.energy, program.robots)
     report = replace(report, energy_low=whole.low, energy_high=whole.high)
     if parameters is not None:
         report = replace(report, power_parameters=parameters.name)
     time, watts, high = _power(steps, request)
-    saved = savings(against, program)
+    by_movements, in_pauses = savings(against, program)
     hops = tuple(_hop(hop) for hop in hops_of(program))
     peak = peak_interval(steps, request)
-    within = (peak.low, peak.high)
-    return Side(name, cycle_time, steps, report, hops, time, watts, high, *saved, "", within)
+    return Side(
+        name=name,
+        cycle_time=cycle_time,
+        movements=steps,
+        report=report,
+        hops=hops,
+        time=time,
+        watts=watts,
+        high=high,
+        moving=by_movements,
+        resting=in_pauses,
+        peak=(peak.low, peak.high),
+    )
 
 
 def hops_of(program: Costed) -> list[CostedHop]:

@@ -455,19 +455,25 @@ class _Model:
         return _Lag(node, (activity, number % self.units), seconds, number // self.units)
 
     def _windows(self) -> bool:
-        """The soonest and the latest begin of every activity, and what comes before what; whether
-        there may be a cycle.
+        """The soonest and the latest begin of every activity [s], and what comes before what;
+        whether there may be a cycle.
+
+        Windows narrow and orders follow from each other until nothing changes any more.
         """
         moving = {node: self.problem.activity(node).seconds[0] for node in self.nodes}
+        first = self.first
         self.soonest = {}
         self.latest = {}
         for node in self.nodes:
-            on_the_way = moving[self.first] + self._travel[self.first[0], node[0]]
-            self.soonest[node] = 0.0 if node == self.first else on_the_way
-            back = self._travel[node[0], self.first[0]]
-            self.latest[node] = 0.0 if node == self.first else self.most - moving[node] - back
+            if node == first:
+                self.soonest[node] = 0.0
+                self.latest[node] = 0.0
+                continue
+            back = self._travel[node[0], first[0]]
+            self.soonest[node] = moving[first] + self._travel[first[0], node[0]]
+            self.latest[node] = self.most - moving[node] - back
         self.order = {(lag.start, lag.end) for lag in self.lags if lag.periods == 0}
-        self.order |= {(self.first, node) for node in self.nodes[1:]}
+        self.order |= {(first, node) for node in self.nodes[1:]}
         changed = True
         while changed:
             changed = False

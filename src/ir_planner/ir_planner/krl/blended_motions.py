@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Protocol
@@ -420,22 +419,28 @@ def joined(
     moves: Sequence[Move], overlaps: Sequence[int]
 ) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
     """Grid steps (M,), and q, qd, qdd (M, n) there, of moves of which each overlaps the one
-    before.
+    before by some grid steps: where two overlap, their motions add up.
     """
     lasting = [move.law.total for move in moves]
-    begins = [0, *itertools.accumulate(a - b for a, b in zip(lasting[:-1], overlaps, strict=True))]
-    knots = np.unique(
-        np.concatenate([move.switches() + at for move, at in zip(moves, begins, strict=True)])
-    )
-    total = [
-        np.zeros((len(knots), len(moves[0].at(np.zeros(1, np.int64))[0][0]))) for _ in range(3)
-    ]
-    for k, (move, at) in enumerate(zip(moves, begins, strict=True)):
-        q, qd, qdd = move.at(knots - at)
-        start = q[0] if k == 0 else move.at(np.zeros(1, np.int64))[0][0]
-        for held, part in zip(total, (q - start if k else q, qd, qdd), strict=True):
-            held += part
-    q, qd, qdd = total
+    begins = [0]
+    for before, overlap in zip(lasting[:-1], overlaps, strict=True):
+        begins.append(begins[-1] + before - overlap)
+    switches = []
+    for move, begin in zip(moves, begins, strict=True):
+        switches.append(move.switches() + begin)
+    knots = np.unique(np.concatenate(switches))
+
+    first_step = np.zeros(1, np.int64)
+    shape = (len(knots), len(moves[0].at(first_step)[0][0]))
+    q = np.zeros(shape)
+    qd = np.zeros(shape)
+    qdd = np.zeros(shape)
+    for k, (move, begin) in enumerate(zip(moves, begins, strict=True)):
+        own_q, own_qd, own_qdd = move.at(knots - begin)
+        # every move but the first adds what it changes
+        q += own_q - move.at(first_step)[0][0] if k else own_q
+        qd += own_qd
+        qdd += own_qdd
     qd[[0, -1]] = qdd[[0, -1]] = 0.0
     return knots, q, qd, qdd
 

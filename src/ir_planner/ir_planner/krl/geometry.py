@@ -26,19 +26,23 @@ _TAUGHT = np.radians(0.05)  # rad: a bit of the turn may be wrong by rounding up
 
 def _signs(chain: Chain, q: FloatArray) -> FloatArray:
     """(N, 9): what the bits are signs of, a set bit is negative: three of the status, six of the
-    turn.
+    turn. The status says whether the wrist is before axis 1, how the elbow is bent, and how axis 5.
     """
     base = int(chain.first_slides)
     poses = chain.link_poses(q)[:, base:]
     arm = q[:, base:]
     axes = chain.robot.joint_axis[base:]
-    shoulder, elbow, wrist = (poses[:, k, :3, 3] for k in (2, 3, 5))
+    shoulder = poses[:, 2, :3, 3]
+    elbow = poses[:, 3, :3, 3]
+    wrist = poses[:, 5, :3, 3]
     # in the robot's foot, on a rail where that is now
-    seen = portable.matmul((wrist - poses[:, 0, :3, 3])[:, None], chain.base_pose[:3, :3])[:, 0]
+    from_foot = wrist - poses[:, 0, :3, 3]
+    seen = portable.matmul(from_foot[:, None], chain.base_pose[:3, :3])[:, 0]
     turned = arm[:, 0] * axes[0, 2]
     before = portable.cos(turned) * seen[:, 0] + portable.sin(turned) * seen[:, 1]
-    axis = portable.matmul(poses[:, 3, :3, :3], axes[2])
-    bent = np.einsum("ni,ni->n", np.cross(elbow - shoulder, wrist - elbow), axis)
+    axis3 = portable.matmul(poses[:, 3, :3, :3], axes[2])
+    across = np.cross(elbow - shoulder, wrist - elbow)
+    bent = np.einsum("ni,ni->n", across, axis3)
     return np.column_stack([before, -bent, arm[:, 4], arm])
 
 

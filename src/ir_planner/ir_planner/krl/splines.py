@@ -119,11 +119,13 @@ def _cost(problem: _Problem, slowness: FloatArray, used: FloatArray) -> float:
 
 
 def _change(problem: _Problem, slowness: FloatArray, used: FloatArray, trust: float) -> FloatArray:
-    """The change (K,) of the slowness that a linear program finds.
+    """The change (K,) of the slowness that a linear program finds, at most `trust` each.
 
     Its variables are the change, the sizes of the slowness, what limits are exceeded by, and by
     what share the movement is longer than planned.
     """
+    from scipy.optimize import linprog  # half a second of imports, for who needs a schedule
+
     rows = np.flatnonzero(used > _NEAR)
     count = len(slowness)
     slopes = np.empty((len(rows), count))
@@ -131,23 +133,24 @@ def _change(problem: _Problem, slowness: FloatArray, used: FloatArray, trust: fl
         slopes[:, k] = (problem.used(beside)[rows] - used[rows]) / _STEP
     planned = problem.steps.sum()
     lasting = problem.lasting(slowness)
-    one = np.eye(count)
-    from scipy.optimize import linprog  # half a second of imports, for who needs a schedule
 
-    none = np.zeros((count, 1))
+    # limits are kept to first order, or exceeded by what costs most
     limits = np.column_stack(
         [slopes, np.zeros_like(slopes), -np.ones(len(rows)), np.zeros(len(rows))]
     )
-    longer = np.concatenate(
-        [portable.matmul(lasting, problem.basis) / planned, np.zeros(count), [0.0, -1.0]]
-    )
-    above, below = (np.column_stack([sign * one, -one, none, none]) for sign in (1.0, -1.0))
+    by_change = portable.matmul(lasting, problem.basis) / planned
+    longer = np.concatenate([by_change, np.zeros(count), [0.0, -1.0]])
+    # the size of the slowness is at least itself and its negative
+    one = np.eye(count)
+    none = np.zeros((count, 1))
+    above = np.column_stack([1.0 * one, -one, none, none])
+    below = np.column_stack([-1.0 * one, -one, none, none])
+    costs = np.concatenate([np.zeros(count), np.full(count, _CHANGED / count), [_MISSED, 1.0]])
+    exceeded = [1.0 - lasting.sum() / planned]
     found = linprog(
-        np.concatenate([np.zeros(count), np.full(count, _CHANGED / count), [_MISSED, 1.0]]),
+        costs,
         A_ub=np.vstack([limits, longer, above, below]),
-        b_ub=np.concatenate(
-            [_USED - used[rows], [1.0 - lasting.sum() / planned], -slowness, slowness]
-        ),
+        b_ub=np.concatenate([_USED - used[rows], exceeded, -slowness, slowness]),
         bounds=[*[(-trust, trust)] * count, *[(0.0, None)] * (count + 2)],
         method="highs",
     )
@@ -203,15 +206,21 @@ def timed_block(
     if times is None:
         return None
     times = times / block.parts[0].speeds.override
-    # at rest where the last point lies
+    # at rest where the last point lies: the end is on the grid
     times = times * (round(times[-1] / GRID_S) * GRID_S / times[-1])
     spline = resting_spline(times, points)
-    inner = zip(
-        times[:-1], times[1:], np.ceil(np.diff(times) * _KNOTS_PER_S).astype(int), strict=True
-    )
-    fine = np.concatenate([np.linspace(a, b, count + 1) for a, b, count in inner])
+
+    # instants of the trajectory: on the grid, evenly between two points
+    counts = np.ceil(np.diff(times) * _KNOTS_PER_S).astype(int)
+    between = []
+    for first, last, count in zip(times[:-1], times[1:], counts, strict=True):
+        between.append(np.linspace(first, last, count + 1))
+    fine = np.concatenate(between)
     steps = np.unique(np.rint(fine / GRID_S)).astype(np.int64)
-    q, qd, qdd = (np.asarray(spline(steps * GRID_S, nu=k)) for k in range(3))
+    seconds = steps * GRID_S
+    q = np.asarray(spline(seconds, nu=0))
+    qd = np.asarray(spline(seconds, nu=1))
+    qdd = np.asarray(spline(seconds, nu=2))
     qd[[0, -1]] = 0.0
     qdd[[0, -1]] = 0.0
     q[0] = points[0]
@@ -258,16 +267,21 @@ def stretched(
     (P,) [s].
     """
     own = np.linspace(0.0, driven.duration, max(len(driven.times_ns), 2) * _PER_INTERVAL)
-    total = _slow(own, slowed)[0][-1]
+    slow_own, _, _ = _slow(own, slowed)
+    total = slow_own[-1]
     steps = int(np.ceil(total / GRID_S - _ROUNDING))
     scale = steps * GRID_S / total  # less than a step longer: it ends on the grid
     times = np.arange(steps + 1) * GRID_S
     count = max(round(times[-1] * _KNOTS_PER_S), 2)
-    times = np.unique(np.rint(np.linspace(0, steps, count + 1)).astype(np.int64)) * GRID_S
-    before = np.interp(times / scale, _slow(own, slowed)[0], own)
+    even = np.linspace(0, steps, count + 1)
+    times = np.unique(np.rint(even).astype(np.int64)) * GRID_S
+
+    # the instants of the given movement that are at these times now, by Newton's method
+    wanted = times / scale
+    before = np.interp(wanted, slow_own, own)
     for _ in range(_NEWTON):
         at, slope, _ = _slow(before, slowed)
-        before = np.clip(before - (at - times / scale) / slope, 0.0, driven.duration)
+        before = np.clip(before - (at - wanted) / slope, 0.0, driven.duration)
     _, slope, bend = _slow(before, slowed)
     slope = (slope * scale)[:, None]
     bend = (bend * scale)[:, None]
@@ -275,8 +289,9 @@ def stretched(
     qd = found.qd / slope
     qdd = (found.qdd - qd * bend) / slope**2
     grid = np.rint(times / GRID_S).astype(np.int64) * GRID_NS
-    again = JointTrajectory(driven.joint_names, grid, found.q, qd, qdd)
-    return again, _slow(passed, slowed)[0] * scale
+    longer = JointTrajectory(driven.joint_names, grid, found.q, qd, qdd)
+    slow_passed, _, _ = _slow(passed, slowed)
+    return longer, slow_passed * scale
 
 
 def _slow(
@@ -397,24 +412,31 @@ def _rails(block: SplineBlock, start: FloatArray, arm: Arm, ends: list[int]) -> 
 def _tool_spline(block: SplineBlock, start: FloatArray, arm: Arm) -> AxisCurve:
     """The spline of the tool through the ends of the parts, followed by the axes."""
     first = block.parts[0]
-    stacked, ends = spline_poses(block, start, arm)
-    steps = np.linalg.norm(np.diff(stacked[:, :3, 3], axis=0), axis=1)
+    poses, ends = spline_poses(block, start, arm)
+    places = poses[:, :3, 3]
+    rotations = poses[:, :3, :3]
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     if steps.min() <= 0.0:
         raise KrlMotionError("a SPLINE goes to the same place twice in a row", block.place)
     length = float(steps.sum())
     u = np.concatenate([[0.0], np.cumsum(steps)]) / length
     slid = _rails(block, start, arm, ends)
     longest = max(length, float(np.abs(np.diff(slid, axis=0)).sum()))
-    fine = np.linspace(0.0, 1.0, int(np.clip(longest / _STEP_M, _SAMPLES_MIN, _SAMPLES_MAX)))
-    along = np.tile(np.eye(4), (len(fine), 1, 1))
-    places = portable.interpolating_spline(u, stacked[:, :3, 3], min(3, len(u) - 1))
-    along[:, :3, 3] = places(fine)
-    along[:, :3, :3] = RotationSpline(u, stacked[:, :3, :3])(fine)
-    rails = portable.interpolating_spline(u, slid, min(3, len(u) - 1))(fine) if slid.size else slid
-    for place in (rails.min(axis=0), rails.max(axis=0)) if slid.size else ():
-        arm.check_limits(np.append(place, start[len(place) :]), first.target, block.place)
+    samples = int(np.clip(longest / _STEP_M, _SAMPLES_MIN, _SAMPLES_MAX))
+    fine = np.linspace(0.0, 1.0, samples)
+    along = np.tile(np.eye(4), (samples, 1, 1))
+    degree = min(3, len(u) - 1)
+    curve = portable.interpolating_spline(u, places, degree)
+    along[:, :3, 3] = curve(fine)
+    along[:, :3, :3] = RotationSpline(u, rotations)(fine)
+    rails = slid
+    if slid.size:  # between two places a spline may leave the travel that both keep
+        rails = portable.interpolating_spline(u, slid, degree)(fine)
+        for extreme in (rails.min(axis=0), rails.max(axis=0)):
+            q_there = np.append(extreme, start[len(extreme) :])
+            arm.check_limits(q_there, first.target, block.place)
     q = followed(along, rails, first, start, arm)
-    turning = float(turn_of(portable.matmul(stacked[0, :3, :3].T, stacked[-1, :3, :3])))
+    turning = float(turn_of(portable.matmul(rotations[0].T, rotations[-1])))
     spline = portable.interpolating_spline(fine, q, _DEGREE)
     return AxisCurve(spline, length, turning, u[ends[:-1]])
 
@@ -442,10 +464,12 @@ def tool_motion(motion: Motion, start: FloatArray, arm: Arm) -> ToolMotion | Non
     """A LIN or CIRC from the configuration `start` (n,); None for one that no segment describes: it
     turns on the spot, it leads another tool than the cell's, which turns, or its speed is out of
     bounds.
+
+    A circle that goes on beyond half a turn is described by several arcs, of two poses each.
     """
     first, last, path = tool_ends(motion, start, arm)
-    pieces = 1 if isinstance(path, Line) else max(int(np.ceil(abs(path.angle) / np.pi)), 1)
-    share = np.linspace(0.0, 1.0, 2 * pieces + 1)
+    arcs = 1 if isinstance(path, Line) else max(int(np.ceil(abs(path.angle) / np.pi)), 1)
+    share = np.linspace(0.0, 1.0, 2 * arcs + 1)
     poses = np.tile(np.eye(4), (len(share), 1, 1))
     poses[:, :3, 3] = path.at(share * path.length)
     poses[:, :3, :3] = turned_evenly(first[:3, :3], last[:3, :3], share)
@@ -454,12 +478,13 @@ def tool_motion(motion: Motion, start: FloatArray, arm: Arm) -> ToolMotion | Non
     if path.length < _SHORTEST or not _is_described(motion.target, turning, speed, arm):
         return None
     tcp = _in_cell(poses, motion.target, arm)
+    segments = []
     if isinstance(path, Line):
-        segments = [CartesianSegment(LINE, (tcp[-1],), speed)]
+        segments.append(CartesianSegment(LINE, (tcp[-1],), speed))
     else:
-        segments = [
-            CartesianSegment(CIRCLE, (tcp[k], tcp[k + 1]), speed) for k in range(1, 2 * pieces, 2)
-        ]
+        for middle in range(1, 2 * arcs, 2):
+            through = (tcp[middle], tcp[middle + 1])
+            segments.append(CartesianSegment(CIRCLE, through, speed))
     return ToolMotion(tcp[0], tuple(segments), _corner(motion.blend, path.length))
 
 

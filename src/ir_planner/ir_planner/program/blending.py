@@ -445,6 +445,8 @@ def blended(timed: TimedChoice) -> TimedChoice:
 def _shortest(choice: Choice, cycle_time: float, standing: float) -> TimedChoice | None:
     """The fastest movements without rests, slowed down evenly to the cycle; None where nothing is
     joined. Raises RequestError where they are too slow.
+
+    cycle_time [s], of which `standing` s are pauses.
     """
     context = choice.movements.context
     blending = Blending(choice, context.asking("time"))
@@ -461,6 +463,8 @@ def _shortest(choice: Choice, cycle_time: float, standing: float) -> TimedChoice
     within = {part for join in joined for part in join.parts}
     alone = [movement for part, movement in found.items() if part not in within]
     driven = [*(join.movement for join in joined), *alone]
+
+    # what is left of the cycle for movements whose time isn't fixed
     fixed = sum(one.trajectory.duration for one in driven if one.fixed_time)
     moving = sum(one.trajectory.duration for one in driven if not one.fixed_time)
     left = cycle_time - standing - fixed
@@ -472,13 +476,15 @@ def _shortest(choice: Choice, cycle_time: float, standing: float) -> TimedChoice
         )
     factor = float(np.floor(1e6 * left / moving) / 1e6)
     slower = {part: _movement_slowed(movement, factor) for part, movement in found.items()}
-    joined = [replace(join, movement=_movement_slowed(join.movement, factor)) for join in joined]
-    alone = [movement for part, movement in slower.items() if part not in within]
-    driven = [*(join.movement for join in joined), *alone]
+    slower_joined = [
+        replace(join, movement=_movement_slowed(join.movement, factor)) for join in joined
+    ]
+    slower_alone = [movement for part, movement in slower.items() if part not in within]
+    driven = [*(join.movement for join in slower_joined), *slower_alone]
     wait = cycle_time - standing - sum(one.trajectory.duration for one in driven)
     energy = sum(one.energy.total for one in driven)
     timed = Timed(slower, wait if wait >= SHORTEST_WAIT else 0.0, energy)
-    return TimedChoice(choice, timed, cycle_time, joined=tuple(joined))
+    return TimedChoice(choice, timed, cycle_time, joined=tuple(slower_joined))
 
 
 def _movement_slowed(movement: Movement, factor: float) -> Movement:

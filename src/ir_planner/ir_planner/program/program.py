@@ -100,34 +100,46 @@ def _tool(q: FloatArray, scene: PlanningScene) -> FloatArray:
 def _withdrawal_log(
     place: int, node: StopNode, found: ExitPath, movements: Movements
 ) -> WithdrawalLog:
-    """The withdrawal at a stop, along its points `found` but for whole turns."""
+    """The withdrawal at a stop, along its points `found` but for whole turns.
+
+    Only the stochastic search walks in generations: of other methods the log has the path alone.
+    """
     scene = movements.route.arriving(place)
     station = scene.station(movements.route.name(place))
     share = np.linspace(0.0, 1.0, _BETWEEN)[:, None, None]
     steps = found.points[:-1] + share * np.diff(found.points, axis=0)
     along = steps.transpose(1, 0, 2).reshape(-1, found.points.shape[1])
-    walk = found.search.walk
-    rejected = found.search.rejected
-    starts = found.points[:1] if walk is None else walk.kept
-    dropped = starts[:0] if walk is None else walk.dropped
-    every = max(-(-len(dropped) // _DROPPED), 1)
+    rejected = sorted(found.search.rejected.items(), key=lambda item: (-item[1], item[0]))
     arriving = movements.context.inside(scene).at(station.name)
-    return WithdrawalLog(
+    leaving = arriving.inside(movements.route.leaving(place))
+    start = found.points[:1]
+    log = WithdrawalLog(
         station=station.name,
         load=scene.load_text,
         method=found.method,
-        generations=0 if walk is None else walk.generations,
-        candidates=0 if walk is None else walk.candidates,
-        rejected=tuple(sorted(rejected.items(), key=lambda item: (-item[1], item[0]))),
-        distance=(0.0, 0.0) if walk is None else walk.distance,
-        kept=_tool(starts, scene),
-        parents=np.zeros(1, dtype=np.int64) if walk is None else walk.parents,
-        dropped=_tool(dropped[::every], scene),
+        generations=0,
+        candidates=0,
+        rejected=tuple(rejected),
+        distance=(0.0, 0.0),
+        kept=_tool(start, scene),
+        parents=np.zeros(1, dtype=np.int64),
+        dropped=_tool(start[:0], scene),
         path=_tool(along, scene),
         asked=station.search.withdrawal != "",
-        blocked=_blocked(
-            node.interaction, (arriving, arriving.inside(movements.route.leaving(place)))
-        ),
+        blocked=_blocked(node.interaction, (arriving, leaving)),
+    )
+    walk = found.search.walk
+    if walk is None:
+        return log
+    every = max(-(-len(walk.dropped) // _DROPPED), 1)
+    return replace(
+        log,
+        generations=walk.generations,
+        candidates=walk.candidates,
+        distance=walk.distance,
+        kept=_tool(walk.kept, scene),
+        parents=walk.parents,
+        dropped=_tool(walk.dropped[::every], scene),
     )
 
 

@@ -144,7 +144,12 @@ class _Model:
         self._later = [self._of_zone(zone) for zone in zones]
 
     def _of_arm(self, robot: int, work: ArmWork) -> list[int]:
-        """Begins of the movements of a robot, and of the first one of its next cycle."""
+        """Begins of the movements of a robot, and of the first one of its next cycle: variables of
+        the program, to which all others of the robot are added.
+
+        A movement lasts its shortest time and what its cheaper parts add; a wait in exactly one
+        mode follows.
+        """
         program = self._program
         far = 0.0 if robot == 0 else self._high
         begin = [program.variable(-far, far)]
@@ -158,21 +163,10 @@ class _Model:
                 self.costs[part] = slope
                 parts.append((part, length))
             after = (k + 1) % count
-            waits = []
-            for mode in work.modes[after]:
-                longest = min(mode.longest, self._high)
-                if mode.shortest > longest:
-                    continue
-                chosen = program.binary()
-                lasts = program.variable(0.0, longest)
-                program.row({lasts: 1.0, chosen: -longest}, high=0.0)
-                program.row({lasts: 1.0, chosen: -mode.shortest}, low=0.0)
-                self.costs[chosen] = mode.joules
-                self.costs[lasts] = mode.watts
-                waits.append((chosen, lasts, mode))
-            program.row({chosen: 1.0 for chosen, _, _ in waits}, low=1.0, high=1.0)
-            fixed = curve.seconds[0] + work.standing[after][0]
-            self._fixed += curve.joules[0] + work.standing[after][1]
+            waits = self._waits_in(work.modes[after])
+            standing_seconds, standing_joules = work.standing[after]
+            fixed = curve.seconds[0] + standing_seconds
+            self._fixed += curve.joules[0] + standing_joules
             end = program.variable(-np.inf, np.inf)
             terms = {end: 1.0, begin[-1]: -1.0}
             terms |= {part: -1.0 for part, _ in parts}
@@ -183,10 +177,9 @@ class _Model:
             self._waits[robot].append(waits)
         program.row({begin[-1]: 1.0, begin[0]: -1.0, self.period: -1.0}, low=0.0, high=0.0)
         for lag in work.lags:
-            after = begin[lag.later]
-            terms = {after: 1.0, begin[lag.earlier]: -1.0}
+            terms = {begin[lag.later]: 1.0, begin[lag.earlier]: -1.0}
             terms |= {part: -1.0 for part, _ in self._parts[robot][lag.earlier]}
-            if lag.later <= lag.earlier:
+            if lag.later <= lag.earlier:  # in the next cycle
                 terms[self.period] = 1.0
             program.row(terms, low=lag.seconds + work.movements[lag.earlier].seconds[0])
         return begin
@@ -240,19 +233,42 @@ class _Model:
         period = float(values[self.period])
         return JointCycle(period, float(joules), self._fixed + answer.bound, tuple(arms), later)
 
+    def _waits_in(self, modes: Sequence[WaitMode]) -> list[tuple[int, int, WaitMode]]:
+        """A wait in exactly one of the modes: for each that the period has time for the variable
+        that chooses it, the one that says how long it lasts [s], and the mode.
+        """
+        program = self._program
+        waits = []
+        for mode in modes:
+            longest = min(mode.longest, self._high)
+            if mode.shortest > longest:
+                continue
+            chosen = program.binary()
+            lasts = program.variable(0.0, longest)
+            # as long as the mode may last where it is chosen, else 0
+            program.row({lasts: 1.0, chosen: -longest}, high=0.0)
+            program.row({lasts: 1.0, chosen: -mode.shortest}, low=0.0)
+            self.costs[chosen] = mode.joules
+            self.costs[lasts] = mode.watts
+            waits.append((chosen, lasts, mode))
+        program.row({chosen: 1.0 for chosen, _, _ in waits}, low=1.0, high=1.0)
+        return waits
+
     def _schedule(self, robot: int, values: FloatArray) -> ArmSchedule:
+        """Begins, durations and waits [s] of a robot's movements, from all variables' values."""
         begins = tuple(float(values[k]) for k in self._begin[robot][:-1])
         work = self._works[robot]
-        seconds = tuple(
-            curve.seconds[0] + sum(float(values[part]) for part, _ in parts)
-            for curve, parts in zip(work.movements, self._parts[robot], strict=True)
-        )
+        seconds = []
+        for curve, parts in zip(work.movements, self._parts[robot], strict=True):
+            longer = sum(float(values[part]) for part, _ in parts)
+            seconds.append(curve.seconds[0] + longer)
         waits: list[tuple[ModeWait, ...]] = []
         for options in self._waits[robot]:
-            taken = next(each for each in options if values[each[0]] > 0.5)
-            length = float(values[taken[1]])
-            waits.append((ModeWait(taken[2].name, length),) if length > _NO_WAIT else ())
-        return ArmSchedule(begins, seconds, (waits[-1], *waits[:-1]))
+            _, lasts, mode = next(each for each in options if values[each[0]] > 0.5)
+            length = float(values[lasts])
+            waits.append((ModeWait(mode.name, length),) if length > _NO_WAIT else ())
+        # the wait after the last movement is before the first one of the next cycle
+        return ArmSchedule(begins, tuple(seconds), (waits[-1], *waits[:-1]))
 
 
 # The zones of a pair of robots, from what could meet. A robot's activities in turn are: a stop (0),

@@ -288,7 +288,7 @@ class _Joint:
         self, zones: tuple[ExclusiveZone, ...], chosen: Chosen, first: JointCycle, fastest: float
     ) -> RobotsPlan:
         """The answer: durations as chosen, the cheapest order and waits for them, signals that keep
-        the order, and a program for each robot.
+        the order, and a program for each robot. fastest: the shortest period [s].
         """
         fixed = [arm.work(own) for arm, own in zip(self.arms, chosen, strict=True)]
         cycle = cheapest_joint(fixed, zones, first.period + _ROUNDING)
@@ -300,27 +300,29 @@ class _Joint:
         signals = self._signals(zones, names, turns)
         begins = [self._begin(k, schedule) for k, schedule in enumerate(cycle.arms)]
         programs = []
+        leads = []
         for k, (arm, planner) in enumerate(zip(self.arms, self.planners, strict=True)):
             steps = arm.driven(chosen[k], cycle.arms[k].waits, signals[k])
             programs.append(planner.kept_program(program_of(steps), arm.request))
+            leads.append(arm.lead(begins[k] - min(begins)))
+        shared = []
+        for k, zone in enumerate(zones):
+            shared.append(self._shared(k, zone, cycle, (names[k], turns[k])))
+        excess = max(cycle.joules - first.bound, 0.0)
         return RobotsPlan(
-            Status.success(),
-            self.name,
-            tuple(arm.robot for arm in self.arms),
-            tuple(programs),
-            tuple(
-                arm.lead(begin - min(begins)) for arm, begin in zip(self.arms, begins, strict=True)
-            ),
-            self.planners,
-            tuple(
-                self._shared(n, zone, cycle, (names[n], turns[n])) for n, zone in enumerate(zones)
-            ),
-            tuple(begins),
-            cycle.period,
-            fastest,
-            self._full_speed(zones, cycle.period),
-            100.0 * max(cycle.joules - first.bound, 0.0) / cycle.joules,
-            self._meetings.proved,
+            status=Status.success(),
+            name=self.name,
+            robots=tuple(arm.robot for arm in self.arms),
+            programs=tuple(programs),
+            leads=tuple(leads),
+            planners=self.planners,
+            zones=tuple(shared),
+            begins=tuple(begins),
+            period=cycle.period,
+            fastest=fastest,
+            full_speed=self._full_speed(zones, cycle.period),
+            gap=100.0 * excess / cycle.joules,
+            proved=self._meetings.proved,
         )
 
     def _begin(self, robot: int, schedule: ArmSchedule) -> float:
@@ -347,23 +349,31 @@ class _Joint:
     def _signals(
         self, zones: Sequence[ExclusiveZone], names: Sequence[str], turns: Sequence[int]
     ) -> list[list[tuple[tuple[str, ...], tuple[str, ...]]]]:
-        """Of each movement of each robot, the signals that it waits for and that it sets."""
+        """Of each movement of each robot, the signals that it waits for and that it sets.
+
+        `turns`: which of the two stretches of a zone comes first. Its robot waits until the signal
+        is off, and switches it on behind the zone; the other one does the reverse.
+        """
         waits: list[list[list[str]]] = [[[] for _ in arm.steps] for arm in self.arms]
         sets: list[list[list[str]]] = [[[] for _ in arm.steps] for arm in self.arms]
         for zone, name, turn in zip(zones, names, turns, strict=True):
             stretches = (zone.one, zone.other)
+            off = f"{name}=0"
             for stretch, free, done in (
-                (stretches[turn], f"{name}=0", name),
-                (stretches[1 - turn], name, f"{name}=0"),
+                (stretches[turn], off, name),
+                (stretches[1 - turn], name, off),
             ):
                 count = len(self.arms[stretch.robot].steps)
                 last = (stretch.first + stretch.count - 1) % count
                 waits[stretch.robot][stretch.first].append(free)
                 sets[stretch.robot][last].append(done)
-        return [
-            [(tuple(w), tuple(s)) for w, s in zip(own_waits, own_sets, strict=True)]
-            for own_waits, own_sets in zip(waits, sets, strict=True)
-        ]
+        signals = []
+        for own_waits, own_sets in zip(waits, sets, strict=True):
+            of_arm = []
+            for awaited, switched in zip(own_waits, own_sets, strict=True):
+                of_arm.append((tuple(awaited), tuple(switched)))
+            signals.append(of_arm)
+        return signals
 
     def _shared(
         self, n: int, zone: ExclusiveZone, cycle: JointCycle, signal: tuple[str, int]
