@@ -380,31 +380,48 @@ class _Analyser:
         cell: Cell | None,
         indirect: IndirectMeter | None,
     ) -> StepResult:
-        """What a step took, by all meters that there are."""
+        """What a step took, by all meters that there are: energies in J, NaN where none tells."""
         start = step.start
         end = step.end
-        moved = indirect is not None and not step.movement.is_pause
-        loads = carried(cell, step.movement.load)
-        return StepResult(
+        result = StepResult(
             step=step,
-            energy=meter.energy(start, end) if meter else NAN,
-            straddling_energy=meter.straddling(start, end) if meter else NAN,
-            joint_energy=meter.joints(start, end) if meter else np.full(len(JOINT_NAMES), NAN),
-            base_energy=meter.base(start, end) if meter else NAN,
-            dissipated_energy=meter.dissipated(start, end) if meter else NAN,
-            rectifier_energy=meter.rectifier(start, end) if meter else NAN,
-            peak_power=meter.peak(start, end) if meter else NAN,
-            indirect_energy=indirect.energy(start, end, loads) if indirect and moved else NAN,
-            second_opinion=indirect.second_opinion(start, end, loads)
-            if indirect and moved
-            else NAN,
-            torque_energy=indirect.from_torques(start, end, loads) if indirect and moved else NAN,
-            stored_energy=meter.stored(start, self.link) if meter else NAN,
+            energy=NAN,
+            straddling_energy=NAN,
+            joint_energy=np.full(len(JOINT_NAMES), NAN),
+            base_energy=NAN,
+            dissipated_energy=NAN,
+            rectifier_energy=NAN,
+            peak_power=NAN,
+            indirect_energy=NAN,
+            second_opinion=NAN,
+            torque_energy=NAN,
+            stored_energy=NAN,
             motors_power=self._resting(MOTORS, step, cell),
             tool_deviation=self._deviation(step),
             clearance=clearance,
-            slip=meter.slip(start, end) if meter else 0.0,
         )
+        if meter:
+            result = replace(
+                result,
+                energy=meter.energy(start, end),
+                straddling_energy=meter.straddling(start, end),
+                joint_energy=meter.joints(start, end),
+                base_energy=meter.base(start, end),
+                dissipated_energy=meter.dissipated(start, end),
+                rectifier_energy=meter.rectifier(start, end),
+                peak_power=meter.peak(start, end),
+                stored_energy=meter.stored(start, self.link),
+                slip=meter.slip(start, end),
+            )
+        if indirect and not step.movement.is_pause:
+            loads = carried(cell, step.movement.load)
+            result = replace(
+                result,
+                indirect_energy=indirect.energy(start, end, loads),
+                second_opinion=indirect.second_opinion(start, end, loads),
+                torque_energy=indirect.from_torques(start, end, loads),
+            )
+        return result
 
     def _indirect(self, cell: Cell | None) -> IndirectMeter | None:
         if self.recording.joints is None or cell is None:

@@ -353,32 +353,43 @@ class Opened:
         asked: Sequence[tuple[FloatArray, FloatArray, FloatArray]],
         softness: float,
     ) -> tuple[FloatArray, FloatArray]:
+        """Watts (R,) that the meter would show with unknowns x (K,), and their slopes (R, K).
+
+        `asked`: of each recording the torques (M, n) beside those of its loads, how they grow with
+        the change, and its shape over time (M,). Slopes by a mass or a torque are differences.
+        """
         assert self.estimate.meter is not None  # asked before
+        model = self.estimate.model
         mean = x[: len(self.estimate.prior.names)]
         kind = "" if self.change is None else self.change.kind
         watts = []
         slopes = []
         for k, (run, (more, per, shape)) in enumerate(zip(self.estimate.runs, asked, strict=True)):
             with_more = partial(self._with_more, run.prepared, mean)
-            asked_for = with_more(more)
-            power, own = self.estimate.model.watts_and_slopes(mean, asked_for, softness)
+            as_asked = with_more(more)
+            power, own = model.watts_and_slopes(mean, as_asked, softness)
             heavier = with_more(more + self._kg * self.units[k])
-            by_mass = (self.estimate.model.watts(mean, heavier, softness) - power) / self._kg
+            by_mass = (model.watts(mean, heavier, softness) - power) / self._kg
             by_change = np.zeros(len(power))
             if kind in _TORQUES:
                 step = self._kg if kind == PAYLOAD else _SHARE
                 raised = with_more(more + step * per)
-                by_change = (self.estimate.model.watts(mean, raised, softness) - power) / step
+                by_change = (model.watts(mean, raised, softness) - power) / step
+
+            # as the meter sees them, and how they change with its clock
             columns = run.samples.metered(np.column_stack([power, own, by_mass, by_change]))
-            rate = -np.gradient(columns[:, 0], run.samples.step)
+            seen = columns[:, 0]
+            rate = -np.gradient(seen, run.samples.step)
             if kind == CLOCK:
                 columns[:, -1] = rate * shape
             elif kind == WATTS:
                 columns[:, -1] = shape
             none = np.zeros((len(power), self._count - len(mean)))
             wider = [columns[:, 1:-2], none, columns[:, -2:-1], rate[:, None]]
-            watts.append(self._shown(k, x, columns[:, 0], shape))
-            slopes.append(np.hstack([*wider, columns[:, -1:]] if kind else wider))
+            if kind:
+                wider.append(columns[:, -1:])
+            watts.append(self._shown(k, x, seen, shape))
+            slopes.append(np.hstack(wider))
         return self.estimate.meter.reduced(watts), self.estimate.meter.reduced(slopes)
 
     def _with_more(self, prepared: Prepared, mean: FloatArray, more: FloatArray) -> Prepared:
@@ -520,6 +531,9 @@ def _stretches_of_rest(at: Callable[..., Change], first: float, last: float) -> 
 def _likeliest(kind: str, usual: Opened, x: FloatArray) -> list[Change]:
     """The changes of a kind that explain most to first order: of a payload, which first order tells
     least well, the best of each part of the recordings; none where that is little.
+
+    Each candidate adds one column to the least squares of the usual fit, after what the other
+    parameters can explain of it.
     """
     about = _FirstOrder.of(usual, x)
     rows = len(about.weight)
@@ -529,18 +543,21 @@ def _likeliest(kind: str, usual: Opened, x: FloatArray) -> list[Change]:
     best: dict[int, tuple[float, Change]] = {}
     candidates = list(_candidates(kind, usual))
     parts = _PARTS if kind == PAYLOAD else 1
-    for k, each in enumerate(candidates):
-        inside = places == each.number
+    for k, candidate in enumerate(candidates):
+        inside = places == candidate.number
         column = np.zeros(rows)
-        column[inside] = (along * each.shape(times))[inside]
+        column[inside] = (along * candidate.shape(times))[inside]
         size = float(column @ column)
-        alone = size - float(np.square(about.basis[:rows].T @ column).sum())
+        explained = float(np.square(about.basis[:rows].T @ column).sum())
+        alone = size - explained
         if not alone > _SEEN * size:
             continue
         projected = float(column @ about.left[:rows])
+        gain = projected**2 / alone
         part = k * parts // len(candidates)
-        if projected**2 / alone > best.get(part, (least, each))[0]:
-            best[part] = projected**2 / alone, replace(each, size=projected / alone)
+        best_gain, _ = best.get(part, (least, candidate))
+        if gain > best_gain:
+            best[part] = gain, replace(candidate, size=projected / alone)
     return [change for _, change in best.values()]
 
 
@@ -557,37 +574,55 @@ def _moved_clock(usual: Opened, x: FloatArray) -> tuple[Change, FloatArray] | No
     before.
     """
     assert usual.estimate.meter is not None  # asked before
+    meter = usual.estimate.meter
     places, times = usual.times()
-    places = places[: len(usual.estimate.meter.measured)]
+    places = places[: len(meter.measured)]
     times = times[: len(places)]
     found = []
     for begin in (x, usual.before):
         shown = np.array([usual.shown_later(begin, lag) for lag in _LAGS])
         for k, run in enumerate(usual.estimate.runs):
-            at = times[places == k]
-            inside = np.flatnonzero(
-                (at > at.min(initial=np.inf) + _NEAR_END)
-                & (at < at.max(initial=-np.inf) - _NEAR_END)
-            )
-            if not len(inside):
+            own = places == k
+            step = _clock_step(meter.measured[own], shown[:, own], times[own])
+            if step is None:
                 continue
-            measured = usual.estimate.meter.measured[places == k]
-            both = [_unlike(measured, each, inside) for each in shown[:, places == k]]
-            before, behind = (np.array(each) for each in zip(*both, strict=True))
-            least = before.min(axis=0) + behind.min(axis=0)
-            whole = (before[:, -1] + behind[:, -1]).min()
-            best = int(least.argmin())
-            if least[best] > _NEARER * whole:
-                continue
-            first, then = (_LAGS[each[:, best].argmin()] for each in (before, behind))
-            instant = float(at[inside[best]])
+            left, instant, first, then = step
             change = Change(run.name, CLOCK, instant, size=float(then - first), number=k)
-            late = usual.with_lateness(begin, first)
-            found.append((float(least[best]), change, late))
+            found.append((left, change, usual.with_lateness(begin, first)))
     if not found:
         return None
     _, change, start = min(found, key=lambda each: each[0])
     return None if change.size == 0.0 else (change, start)
+
+
+def _clock_step(
+    measured: FloatArray, shown: FloatArray, times: FloatArray
+) -> tuple[float, float, float, float] | None:
+    """The squares [W^2] that are left of measured watts (R,) where the clock steps once, its
+    instant [s], and the lags [s] before and from then on; None where that explains hardly more than
+    one lag. shown: watts (LAGS, R) with each lag.
+    """
+    after_begin = times > times.min(initial=np.inf) + _NEAR_END
+    before_end = times < times.max(initial=-np.inf) - _NEAR_END
+    inside = np.flatnonzero(after_begin & before_end)
+    if not len(inside):
+        return None
+    befores = []
+    behinds = []
+    for with_lag in shown:
+        before, behind = _unlike(measured, with_lag, inside)
+        befores.append(before)
+        behinds.append(behind)
+    left_before = np.array(befores)
+    left_behind = np.array(behinds)
+    least = left_before.min(axis=0) + left_behind.min(axis=0)
+    whole = (left_before[:, -1] + left_behind[:, -1]).min()
+    best = int(least.argmin())
+    if least[best] > _NEARER * whole:
+        return None
+    first = _LAGS[left_before[:, best].argmin()]
+    then = _LAGS[left_behind[:, best].argmin()]
+    return float(least[best]), float(times[inside[best]]), first, then
 
 
 def _unlike(

@@ -155,23 +155,26 @@ class Motors:
         self._runs = tuple(runs)
         self._model = model
         self.n = len(model.layout.joints)
-        self._rows = []
+        self._rows = []  # of each run, the windows in which all torques are known
+        efforts = []
+        windows = []
         for run in runs:
             effort = run.samples.effort
             assert effort is not None  # asked before
-            known = run.samples.known & run.samples.motors & np.isfinite(effort).all(axis=1)
-            self._rows.append(run.whole(known))
-        efforts = [run.samples.effort for run in runs if run.samples.effort is not None]
+            has_effort = np.isfinite(effort).all(axis=1)
+            rows = run.whole(run.samples.known & run.samples.motors & has_effort)
+            self._rows.append(rows)
+            efforts.append(effort)
+            windows.append(run.first + rows)
         self._table = self.reduced(efforts)  # (W, n)
         self.speed = self.reduced([run.prepared.speed for run in runs])
         self.measured = self._table.T.ravel()
-        windows = np.concatenate(
-            [run.first + rows for run, rows in zip(runs, self._rows, strict=True)]
-        )
-        self.window = np.tile(windows, self.n)
+        self.window = np.tile(np.concatenate(windows), self.n)
+        # each joint has two groups of one noise each: moving, then standing
         stands = np.abs(self.speed.T) <= MOVING
         self.group = (np.arange(self.n)[:, None] + self.n * stands).ravel()
-        self.largest = np.maximum(np.abs(self._table).max(axis=0, initial=0.0), 1e-9)
+        largest = np.abs(self._table).max(axis=0, initial=0.0)
+        self.largest = np.maximum(largest, 1e-9)
         self.least = np.tile(_LEAST_SHARE * self.largest, 2)
         self._columns = self.reduced([_bodies(run.prepared) for run in runs])
         self._turned = [self._sides(np.full(self.n, each)) for each in (0.0, *_TRAVELS)]

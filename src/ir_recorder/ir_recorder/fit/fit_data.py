@@ -321,24 +321,31 @@ def fit_data(
     """
     given = (sources,) if isinstance(sources, DataSource) else tuple(sources)
     cells = [source_cell(each) for each in given]
-    if strange := [cell.robot.name for cell in cells if cell.robot.name != prior.robot]:
-        raise RecorderError(f"one fit is of one robot, there is {strange[0]} beside {prior.robot}")
+    for cell in cells:
+        if cell.robot.name != prior.robot:
+            raise RecorderError(
+                f"one fit is of one robot, there is {cell.robot.name} beside {prior.robot}"
+            )
     cell = cells[0]
     model = PowerModel(cell.robot, cell.robot.controller.dc_link, cell.base_pose, prior)
-    runs = [_run(each, prior, model, by) for each in given]
-    recordings = tuple(samples for samples, _, _ in runs)
+    recordings: tuple[Samples, ...] = ()
+    notes: tuple[str, ...] = ()
+    offsets: tuple[float, ...] = ()
+    for source in given:
+        samples, own_notes, offset = _run(source, prior, model, by)
+        recordings = (*recordings, samples)
+        notes = (*notes, *own_notes)
+        offsets = (*offsets, offset)
     motors = by in BY[1:]
     if not by:
         motors = not any(np.isfinite(samples.watts).any() for samples in recordings)
-    if by == BY[1]:
+    if by == BY[1]:  # by the motors alone
         recordings = tuple(
             replace(samples, watts=np.full(len(samples), np.nan)) for samples in recordings
         )
     if motors and len({samples.currents for samples in recordings}) > 1:
         raise RecorderError("some recordings have torques, others currents: fit them one by one")
-    notes = tuple(note for _, own, _ in runs for note in own)
     names = tuple(each.motion.stem for each in given)
-    offsets = tuple(offset for _, _, offset in runs)
     return FitData(recordings, names, model, notes, motors, offsets)
 
 

@@ -395,6 +395,9 @@ class Estimate:
         return found
 
     def _fit(self, name: str, determined: BoolArray, noise: FloatArray, inflation: float) -> Fit:
+        """The fit as it is handed out: parameters that the data don't tell are as certain as
+        before. noise: of the meter in motion and at rest [W], then of the motors [Nm].
+        """
         count = len(self.prior.names)
         mean = self.found[:count]
         covariance = self.covariance[:count, :count]
@@ -410,40 +413,41 @@ class Estimate:
             covariance=0.5 * (covariance + covariance.T),
             sources=tuple(str(source) for source in sources),
         )
-        none = np.zeros(0)
-        time = none
-        measured = none
-        before = none
-        after = none
+        time = measured = before = after = np.zeros(0)
         moves: tuple[FittedMovement, ...] = ()
+        meter_noise = (np.nan, np.nan)
+        own_noise = noise
         if self.meter is not None:
+            extra = self.found[count:]
             time = self.meter.time()
             measured = self.meter.measured
-            before, after = (
-                self.meter.predicted(np.concatenate([each, self.found[count:]]), 0.0)[0]
-                for each in (self.prior.mean, mean)
-            )
+            before = self.meter.predicted(np.concatenate([self.prior.mean, extra]), 0.0)[0]
+            after = self.meter.predicted(np.concatenate([mean, extra]), 0.0)[0]
             moves = self._movements(self.prior.mean, mean)
-        meters = 2 if self.meter is not None else 0
+            meter_noise = (float(noise[0]), float(noise[1]))
+            own_noise = noise[2:]
         n = len(self.prior.joints)
-        extra = self.found[count:]
+        offsets = self.found[count : count + n]
+        scales = self.found[count + n :]
+        scale_deviations = np.sqrt(np.diag(self.covariance)[count + n :])
+        has_motors = self.motors is not None
         return Fit(
-            found,
-            determined,
-            moves,
-            time,
-            measured,
-            before,
-            after,
-            (float(noise[0]), float(noise[1])) if meters else (np.nan, np.nan),
-            tuple(noise[meters : meters + n if self.motors is not None else meters].tolist()),
-            inflation,
-            self._friction_scale,
-            tuple(extra[:n].tolist()),
-            tuple(extra[n:].tolist()),
-            tuple(np.sqrt(np.diag(self.covariance)[count + n :]).tolist()),
-            () if self.motors is None else tuple(self.motors.travel.tolist()),
-            self.motors is not None and self.motors.currents,
+            parameters=found,
+            determined=determined,
+            movements=moves,
+            time=time,
+            measured=measured,
+            before=before,
+            after=after,
+            noise=meter_noise,
+            torque_noise=tuple(own_noise[:n].tolist()) if has_motors else (),
+            inflation=inflation,
+            friction_scale=self._friction_scale,
+            offsets=tuple(offsets.tolist()),
+            scales=tuple(scales.tolist()),
+            scale_deviations=tuple(scale_deviations.tolist()),
+            travel=() if self.motors is None else tuple(self.motors.travel.tolist()),
+            currents=self.motors is not None and self.motors.currents,
         )
 
     def _first_noise(self) -> FloatArray:

@@ -50,7 +50,7 @@ def arm_torques(
     robot: RobotModel, loads: Sequence[Load], base_pose: FloatArray, motion: FloatArray
 ) -> ArmTorques:
     """Torques at motion (3, N, n), which is q, qd, qdd, of the robot with loads at base_pose (4,
-    4).
+    4). Loads are bolted to the last link.
     """
     q, qd, qdd = motion
     N, n = q.shape
@@ -62,11 +62,26 @@ def arm_torques(
     for i in range(n):
         frame, axes[i] = _next(frame, robot, i, q[:, i], qd[:, i], qdd[:, i])
         places[i] = frame.place
-        link = (float(robot.link_mass[i + 1]), robot.link_com[i + 1], robot.link_inertia[i + 1])
-        _project(links, frame, robot, axes[: i + 1], places[: i + 1], *link)
+        _project(
+            links,
+            frame,
+            robot,
+            axes[: i + 1],
+            places[: i + 1],
+            mass=float(robot.link_mass[i + 1]),
+            com=robot.link_com[i + 1],
+            inertia=robot.link_inertia[i + 1],
+        )
     for load in loads:
-        _project(held, frame, robot, axes, places, load.mass, load.com, load.inertia)
-    return ArmTorques(links, held, qdd * robot.reflected_inertia, spring_torque(robot, q))
+        _project(
+            held, frame, robot, axes, places, mass=load.mass, com=load.com, inertia=load.inertia
+        )
+    return ArmTorques(
+        links=links,
+        loads=held,
+        rotors=qdd * robot.reflected_inertia,
+        counterbalance=spring_torque(robot, q),
+    )
 
 
 def centre_torques(
@@ -208,16 +223,21 @@ def pinocchio_torques(
     for i, (origin, axis) in enumerate(zip(robot.joint_origin, robot.joint_axis, strict=True)):
         place = pinocchio.SE3(origin[:3, :3].copy(), origin[:3, 3].copy())
         kind = "Prismatic" if i < robot.base else "Revolute"
-        joint = getattr(pinocchio, f"JointModel{kind}Unaligned")(axis.copy())
-        parent = model.addJoint(parent, joint, place, f"joint_{i}")
+        of_joint = getattr(pinocchio, f"JointModel{kind}Unaligned")
+        parent = model.addJoint(parent, of_joint(axis.copy()), place, f"joint_{i}")
         bodies = [(robot.link_mass[i + 1], robot.link_com[i + 1], robot.link_inertia[i + 1])]
-        bodies += [(load.mass, load.com, load.inertia) for load in loads if i == robot.n - 1]
+        if i == robot.n - 1:
+            bodies += [(load.mass, load.com, load.inertia) for load in loads]
         for mass, com, inertia in bodies:
             body = pinocchio.Inertia(float(mass), np.array(com), np.array(inertia))
             model.appendBodyToJoint(parent, body, pinocchio.SE3.Identity())
     data = model.createData()
-    rows = [pinocchio.rnea(model, data, *row).copy() for row in motion.transpose(1, 0, 2)]
-    torque = np.array(rows).reshape(q.shape)
+    torques = []
+    for own_q, own_qd, own_qdd in motion.transpose(1, 0, 2):
+        torques.append(pinocchio.rnea(model, data, own_q, own_qd, own_qdd).copy())
     return ArmTorques(
-        torque, np.zeros_like(q), qdd * robot.reflected_inertia, spring_torque(robot, q)
+        links=np.array(torques).reshape(q.shape),
+        loads=np.zeros_like(q),
+        rotors=qdd * robot.reflected_inertia,
+        counterbalance=spring_torque(robot, q),
     )

@@ -234,40 +234,45 @@ class PowerModel:
         """Torques of the bodies at every sample; where the motion is unknown the robot counts as at
         rest.
         """
+        count = len(samples)
+        n = self.robot.n
         known = samples.known[:, None]
         motion = np.where(known, [samples.q, samples.qd, samples.qdd], 0.0)
         motion[0] = np.where(known, samples.q, self.robot.machine_home)
-        parts = [np.zeros((len(samples), self.robot.n)) for _ in range(4)]
-        watts = np.zeros(len(samples))
-        bus_up = np.isin(
-            samples.mode, [k for k, mode in enumerate(self.layout.modes) if drive_bus_up(mode)]
-        )
+        links = np.zeros((count, n))
+        held = np.zeros((count, n))
+        rotors = np.zeros((count, n))
+        spring = np.zeros((count, n))
+        watts = np.zeros(count)
+        modes_with_bus = [k for k, mode in enumerate(self.layout.modes) if drive_bus_up(mode)]
+        bus_up = np.isin(samples.mode, modes_with_bus)
         for k in np.unique(samples.load):
             rows = samples.load == k
             loads = samples.loads[k] if k >= 0 else ()
             own = self._bodies(self.robot, loads, self._pose, motion[:, rows])
-            for part, each in zip(
-                parts, (own.links, own.loads, own.rotors, own.counterbalance), strict=True
-            ):
-                part[rows] = each
+            links[rows] = own.links
+            held[rows] = own.loads
+            rotors[rows] = own.rotors
+            spring[rows] = own.counterbalance
             watts[rows] = sum(load.watts(drive_bus=False) for load in loads)
             watts[rows & bus_up] = sum(load.watts(drive_bus=True) for load in loads)
-        centres = np.zeros((0, len(samples), self.robot.n))
+        centres = np.zeros((0, count, n))
         if self.layout.centres:
             directions = centre_directions(self.robot)
             centres = centre_torques(self.robot, self._pose, motion, directions)
-            centres = centres.reshape(-1, len(samples), self.robot.n)
-        if self.robot.coupled:
-            centres = centres @ np.linalg.inv(self.robot.motor_turns)
+            centres = centres.reshape(-1, count, n)
+        speed = motion[1]
+        if self.robot.coupled:  # torques and speeds of the motors, not of the joints
             turns = self.robot.motor_turns
-            links, held, _, spring = (part @ np.linalg.inv(turns) for part in parts)
+            to_motors = np.linalg.inv(turns)
+            centres = centres @ to_motors
+            links = links @ to_motors
+            held = held @ to_motors
+            spring = spring @ to_motors
             rotors = (motion[2] @ turns.T) * self.robot.reflected_inertia
-            arm = ArmTorques(links, held, rotors, spring)
             speed = motion[1] @ turns.T
-        else:
-            arm = ArmTorques(*parts)
-            speed = motion[1]
-        side = friction_side(speed, samples.step, np.zeros(self.robot.n))
+        arm = ArmTorques(links, held, rotors, spring)
+        side = friction_side(speed, samples.step, np.zeros(n))
         return Prepared(samples, arm, speed, side, watts, centres)
 
     def watts(self, mean: FloatArray, prepared: Prepared, softness: float = 0.0) -> FloatArray:
@@ -353,16 +358,18 @@ class PowerModel:
     ) -> FloatArray:
         """W (M,) that the axes together take from the link; fills `slopes` (M, P) where given."""
         of = self.layout.places
-        copper, iron, inverter, gear = (
-            mean[of(term)] for term in ("copper", "iron", "inverter", "gear")
-        )
+        copper = mean[of("copper")]
+        iron = mean[of("iron")]
+        inverter = mean[of("inverter")]
+        gear = mean[of("gear")]
         qd = prepared.speed
         on = prepared.samples.motors[:, None]
         through, side, torque = self._torque(mean, prepared)
         motor = torque / self._ratio
         axes = torque * qd + copper * motor**2 + inverter * np.abs(motor) + iron * qd**2
         if slopes is not None:
-            by_torque = on * (qd + (2.0 * copper * motor + inverter * np.sign(motor)) / self._ratio)
+            by_motor = 2.0 * copper * motor + inverter * np.sign(motor)
+            by_torque = on * (qd + by_motor / self._ratio)
             slopes[:, of("viscous")] = by_torque * qd
             slopes[:, of("coulomb")] = by_torque * side
             slopes[:, of("gear")] = by_torque * np.abs(through) * side
@@ -373,8 +380,8 @@ class PowerModel:
             for name, body in self._bodies_of(mean, prepared):
                 slopes[:, self.layout.index(name)] = (by_body * body).sum(axis=1)
             mass = self._one(mean, "link_mass")
-            slopes[:, self.layout.centre_places()] = mass * np.einsum(
-                "mn,kmn->mk", by_body, prepared.centres
-            )
+            by_centre = np.einsum("mn,kmn->mk", by_body, prepared.centres)
+            slopes[:, self.layout.centre_places()] = mass * by_centre
             slopes[:, self.layout.index(IDLE)] = prepared.samples.motors
-        return np.asarray((on * axes).sum(axis=1) + self._one(mean, IDLE) * prepared.samples.motors)
+        idle = self._one(mean, IDLE) * prepared.samples.motors
+        return np.asarray((on * axes).sum(axis=1) + idle)

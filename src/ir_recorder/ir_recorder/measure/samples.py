@@ -194,8 +194,8 @@ def samples_of(
     modes: Sequence[str],
     loads: LoadRuns,
 ) -> Samples:
-    """Samples over the time of both traces. `modes`: names in their order; without a column of
-    modes the motors count as on. RecorderError where there is nothing to sample.
+    """Samples over the time of both traces, STEP s apart. `modes`: names in their order; without a
+    column of modes the motors count as on. RecorderError where there is nothing to sample.
     """
     positions = joints.joints(joint_names)
     if positions is None:
@@ -216,26 +216,37 @@ def samples_of(
     edges = first + STEP * np.arange(count + 1)
     middles = 0.5 * (edges[1:] + edges[:-1])
     q, qd, qdd = _motion(joints, positions, middles)
-    mode, motors = _modes(
-        meter if meter is not None and MODE in meter.texts else joints, modes, middles
-    )
+    with_modes = meter if meter is not None and MODE in meter.texts else joints
+    mode, motors = _modes(with_modes, modes, middles)
     for start, length in joints.gaps():  # what stands without drives is not recorded everywhere
         inside = (middles > start) & (middles < start + length) & motors
         for each in (q, qd, qdd):
             each[inside] = np.nan
     held, load = _loads(loads, middles)
-    energy = None if meter is None else meter.joules()
     watts = np.full(count, np.nan)
+    readings = None
+    energy = None if meter is None else meter.joules()
     if meter is not None and energy is not None:
         watts = mean_power(meter.time, energy, edges)
         for start, length in meter.gaps():
             watts[(edges[1:] > start) & (edges[:-1] < start + length)] = np.nan
+        if np.median(np.diff(meter.time)) > _SELDOM * STEP:
+            readings = meter.time
     effort, currents = _effort(joints, joint_names, edges)
-    readings = None
-    if meter is not None and energy is not None and np.median(np.diff(meter.time)) > _SELDOM * STEP:
-        readings = meter.time
     return Samples(
-        STEP, middles, q, qd, qdd, mode, load, motors, watts, held, effort, currents, readings
+        step=STEP,
+        time=middles,
+        q=q,
+        qd=qd,
+        qdd=qdd,
+        mode=mode,
+        load=load,
+        motors=motors,
+        watts=watts,
+        loads=held,
+        effort=effort,
+        currents=currents,
+        readings=readings,
     )
 
 

@@ -71,35 +71,44 @@ def read_egm(path: Path, joint_names: Sequence[str]) -> Trace:
     rows, how, cut, others = _rows(content, path)
     if len(rows) * len(joint_names) > VALUES_MAX:
         raise RecorderError(f"{path}: more than {VALUES_MAX} values, the limit")
-    for row in rows:
-        if len(row.joints) != len(joint_names) or not np.isfinite(row.joints).all():
-            raise RecorderError(
-                f"{path}: message {row.number} of EGM has the joints {list(row.joints)}, must be "
-                f"{len(joint_names)} finite numbers: {', '.join(joint_names)}"
-            )
+    _check_joints(rows, joint_names, path)
+    time, wraps = _unwrapped(np.array([row.time for row in rows]))
+    late = _late(time, rows, path)
+    order = np.argsort(time, kind="stable")
+    is_later = np.concatenate([[True], np.diff(time[order]) > 0.0])
+    kept = order[is_later]
+    steps = np.diff(np.sort([row.number for row in rows]))
+    missing = int((steps[steps > 1] - 1).sum())
+
     notes = [f"{len(rows)} messages of EGM {how}: joints in degrees, as ABB's egm.proto gives them"]
-    notes += [f"{cut} bytes at the end are no whole message: left out"] if cut else []
+    if cut:
+        notes.append(f"{cut} bytes at the end are no whole message: left out")
     if others:
         notes.append(f"{others} messages are not the robot's (EgmRobot with feedback): left out")
-    time, wraps = _unwrapped(np.array([row.time for row in rows]))
-    notes += (
-        [f"the time in ms begins again at 2^32: {wraps} times, taken as going on"] if wraps else []
-    )
-    late = _late(time, rows, path)
-    notes += [f"{late} messages came late: put in order of time"] if late else []
-    order = np.argsort(time, kind="stable")
-    kept = order[np.concatenate([[True], np.diff(time[order]) > 0.0])]
+    if wraps:
+        notes.append(f"the time in ms begins again at 2^32: {wraps} times, taken as going on")
+    if late:
+        notes.append(f"{late} messages came late: put in order of time")
     if len(kept) < len(rows):
         notes.append(f"{len(rows) - len(kept)} messages have the time of another one: left out")
-    numbers = np.sort([row.number for row in rows])
-    missing = int((np.diff(numbers)[np.diff(numbers) > 1] - 1).sum())
-    notes += [f"{missing} messages are missing by their numbers"] if missing else []
+    if missing:
+        notes.append(f"{missing} messages are missing by their numbers")
     if len({row.external for row in rows}) > 1:
         notes.append("external joints move and are not read")
     joints = np.radians([rows[k].joints for k in kept])
     columns = {name: np.ascontiguousarray(joints[:, k]) for k, name in enumerate(joint_names)}
     seconds = time[kept] - time[kept[0]]
     return Trace(str(path), seconds, MappingProxyType(columns), problems=tuple(notes))
+
+
+def _check_joints(rows: Sequence[_Row], joint_names: Sequence[str], path: Path) -> None:
+    """RecorderError where a message has other joints than the robot, or none that are numbers."""
+    for row in rows:
+        if len(row.joints) != len(joint_names) or not np.isfinite(row.joints).all():
+            raise RecorderError(
+                f"{path}: message {row.number} of EGM has the joints {list(row.joints)}, must be "
+                f"{len(joint_names)} finite numbers: {', '.join(joint_names)}"
+            )
 
 
 def _unwrapped(time: FloatArray) -> tuple[FloatArray, int]:

@@ -164,14 +164,16 @@ def _table_of_axes(
     axis each. RecorderError where their instants differ.
     """
     result: dict[str, FloatArray] = {}
-    for k, (table, path) in enumerate(zip(tables, paths, strict=True), 1):
+    axes = range(1, len(paths) + 1)
+    for axis, table, path in zip(axes, tables, paths, strict=True):
         plain = {name.partition("[")[0].strip().lower(): name for name in table}
-        known = (*_POSITIONS, *(f"{each}a{k}" for each in _AXIS_OF))
-        time, position = (
-            next((plain[name] for name in names if name in plain), "") for names in (_TIMES, known)
-        )
-        others = {f"{each}a{j}" for j in range(1, len(paths) + 1) for each in _AXIS_OF if j != k}
-        if not time or not position or others & set(plain):
+        time = _first_of(_TIMES, plain)
+        position = _first_of((*_POSITIONS, *(f"{each}a{axis}" for each in _AXIS_OF)), plain)
+        of_others: set[str] = set()
+        for other in axes:
+            if other != axis:
+                of_others |= {f"{each}a{other}" for each in _AXIS_OF}
+        if not time or not position or of_others & set(plain):
             return {}
         first = result.setdefault(time, table[time])
         if len(first) != len(table[time]) or not np.allclose(first, table[time]):
@@ -179,8 +181,17 @@ def _table_of_axes(
                 f"{path}: its instants are not those of {paths[0].name}: files of one axis each "
                 "are joined where their times are the same"
             )
-        result[f"A{k}{''.join(position.partition(' [')[1:])}"] = table[position]
+        unit = "".join(position.partition(" [")[1:])
+        result[f"A{axis}{unit}"] = table[position]
     return result
+
+
+def _first_of(names: Sequence[str], plain: Mapping[str, str]) -> str:
+    """The heading of the first name that a table has; "": it has none of them."""
+    for name in names:
+        if name in plain:
+            return plain[name]
+    return ""
 
 
 def _channels(text: str) -> Sequence[Channel]:
@@ -198,7 +209,9 @@ def _channels(text: str) -> Sequence[Channel]:
 
 
 def _values(path: Path, channel: Channel, channels: Sequence[Channel]) -> FloatArray:
-    """The numbers (N,) of a channel, in its unit."""
+    """The numbers (N,) of a channel, in its unit: counted up, or read from its file, in which
+    channels stand one after another or number by number in turn.
+    """
     where = f"{path}: channel {shown(channel.get(_NAME, ''))}"
     count = int(_number(channel, _COUNT, where))
     if not 0 < count * len(channels) <= VALUES_MAX:
@@ -211,18 +224,22 @@ def _values(path: Path, channel: Channel, channels: Sequence[Channel]) -> FloatA
     if kind not in _DTYPES:
         known = ", ".join(_DTYPES)
         raise RecorderError(f"{where} is of type {shown(kind)}, known are {known}")
-    raw = np.frombuffer(_content(_file_of_numbers(path, channel.get(_FILE, ""), where)), np.uint8)
+    file = _file_of_numbers(path, channel.get(_FILE, ""), where)
+    raw = np.frombuffer(_content(file), np.uint8)
     size = np.dtype(_DTYPES[kind]).itemsize
-    numbers = raw[: len(raw) // size * size].view(_DTYPES[kind])
+    whole = len(raw) // size * size
+    numbers = raw[:whole].view(_DTYPES[kind])
     first = int(_number(channel, _FIRST, where, 1.0)) - 1
-    blocks = channel.get(_STORED, "").upper() == "BLOCK"
-    stride = sum(each.get(_FILE) == channel.get(_FILE) for each in channels) if blocks else 1
+    stride = 1
+    if channel.get(_STORED, "").upper() == "BLOCK":
+        stride = sum(each.get(_FILE) == channel.get(_FILE) for each in channels)
     last = first + (count - 1) * stride
     if first < 0 or last >= len(numbers):
         raise RecorderError(
             f"{where} ends at number {last + 1}, its file holds {len(numbers)}: was it cut?"
         )
-    return np.asarray(offset + scale * numbers[first : last + 1 : stride].astype(np.float64))
+    own = numbers[first : last + 1 : stride]
+    return np.asarray(offset + scale * own.astype(np.float64))
 
 
 def _number(channel: Channel, key: str, where: str, default: float = math.nan) -> float:

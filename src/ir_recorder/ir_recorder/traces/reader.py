@@ -43,7 +43,7 @@ from ir_recorder.traces.trace import (
     VELOCITY,
     Trace,
 )
-from ir_values.arrays import FloatArray
+from ir_values.arrays import BoolArray, FloatArray
 from ir_values.errors import DescriptionError, InvalidValueError, listed
 from ir_values.extensions import Registry
 
@@ -83,43 +83,60 @@ def read_bag(path: Path, mapping: TraceMapping | None = None) -> Trace:
         raise RecorderError(
             f"{path}: none of its {len(rows)} messages is a {JOINT_STATE} in little-endian CDR"
         )
+
+    # one robot's messages, or those of joints without names
     columns = Columns([rows[k][1] for k in fit], JOINT_STATE, _SCHEMA)
     groups = joint_groups(columns)
-    if list(groups) == [()]:
+    has_names = list(groups) != [()]
+    if not has_names:
         _check_names(path, columns, mapping.joints)
     try:
-        robot = [()] if list(groups) == [()] else one_robot(groups)
+        robot = one_robot(groups) if has_names else [()]
     except ReadError as error:
         raise RecorderError(f"{path}: {error}") from error
-    problems += [
-        f"{len(groups[each])} joint states of {', '.join(each)[:200] or 'no joint'}: left out"
-        for each in groups
-        if each not in robot
-    ]
+    for names, messages in groups.items():
+        if names not in robot:
+            listed = ", ".join(names)[:200] or "no joint"
+            problems.append(f"{len(messages)} joint states of {listed}: left out")
     if len(fit) < len(rows):
         problems.append(f"{len(rows) - len(fit)} messages are no {JOINT_STATE}: left out")
-    rows = [rows[fit[k]] for k in np.sort(np.concatenate([groups[each] for each in robot]))]
+    own = np.sort(np.concatenate([groups[names] for names in robot]))
+    rows = [rows[fit[k]] for k in own]
     columns = Columns([data for _, data in rows], JOINT_STATE, _SCHEMA)
+
+    # by the stamps, or by when messages were recorded where these are all 0
     stamps = columns.stamps()
-    nanoseconds = np.array([time for time, _ in rows]) if not stamps.any() else stamps
+    nanoseconds = stamps if stamps.any() else np.array([time for time, _ in rows])
     time = (nanoseconds - nanoseconds[0]) * 1e-9
-    kept = np.concatenate([[True], time[1:] > np.maximum.accumulate(time)[:-1]])
+    goes_on = time[1:] > np.maximum.accumulate(time)[:-1]
+    kept = np.concatenate([[True], goes_on])
     _check_clock(path, time, kept)
-    found = {}
-    names = robot[0] or mapping.joints
     problems += _unused(robot[0], mapping.joints)
+    found = _joint_columns(columns, robot[0], mapping.joints, kept)
+    lost = int(np.count_nonzero(~kept))
+    if lost:
+        problems.append(f"{lost} joint states go back in time: left out")
+    return Trace(str(path), time[kept], MappingProxyType(found), problems=tuple(problems))
+
+
+def _joint_columns(
+    columns: Columns, own_names: Sequence[str], given: Sequence[str], kept: BoolArray
+) -> dict[str, FloatArray]:
+    """Positions, velocities and efforts of joints in the messages `kept` (N,), by the names of the
+    trace's columns; by the messages' own names, else in the order of the given ones.
+    """
+    names = own_names or given
     paths = [field for field, _ in _FIELDS]
-    if robot[0]:
+    if own_names:
         fields = by_name(columns, names, *paths)
     else:
         fields = [columns.numbers(path, len(names)) for path in paths]
+    found = {}
     for (_, ending), values in zip(_FIELDS, fields, strict=True):
         if np.isfinite(values).any():
             for k, name in enumerate(names):
                 found[f"{name}{ending}"] = values[kept, k].copy()
-    lost = int(np.count_nonzero(~kept))
-    problems += [f"{lost} joint states go back in time: left out"] if lost else []
-    return Trace(str(path), time[kept], MappingProxyType(found), problems=tuple(problems))
+    return found
 
 
 def types_of(path: Path) -> frozenset[str]:

@@ -190,15 +190,52 @@ class _TableReader:
     def trace(self) -> Trace:
         """All rows."""
         numbers = [name for name in self._places if name not in WORDS]
-        texts: dict[str, list[str]] = {name: [] for name in self._places if name in WORDS}
+        values, texts, lines = self._all_rows(numbers)
+        columns = {name: np.ascontiguousarray(values[:, k]) for k, name in enumerate(numbers)}
+        if TIME not in columns:
+            columns[TIME] = self._mapping.step * np.arange(len(values), dtype=np.float64)
+        rises = (np.diff(columns[TIME]) > 0.0).all()
+        if not rises:
+            kept = _once(values, texts)
+            repeated = np.count_nonzero(~kept)
+            if repeated:
+                self._problems.append(f"{repeated} rows repeat the one before: left out")
+                columns = {name: column[kept] for name, column in columns.items()}
+                texts = {name: tuple(compress(words, kept)) for name, words in texts.items()}
+                lines = [np.concatenate(lines)[kept]]
+        time = columns.pop(TIME)
+        self._check_time(time, lines)
+        columns = multiplied(columns, self._mapping)
+        if self._maker is not None:
+            columns, note = self._maker.proved(columns, f"{self._path}:{self._begin}")
+            self._problems.append(note)
+        return Trace(
+            str(self._path),
+            time,
+            MappingProxyType(columns),
+            MappingProxyType(texts),
+            (*self._problems, *_not_read(self._headings, self._places), *_missing(columns)),
+            self._mapping.sampled,
+        )
+
+    def _all_rows(
+        self, numbers: Sequence[str]
+    ) -> tuple[FloatArray, dict[str, tuple[str, ...]], list[IntArray]]:
+        """Values (N, columns) of the columns `numbers`, the words of the others, and the lines of
+        the file that rows stand in, in blocks.
+
+        A block of plain numbers is read at once, any other row by row, which is slower.
+        """
+        words: dict[str, list[str]] = {name: [] for name in self._places if name in WORDS}
         blocks = []
         lines = []
         size = 0
         line = self._begin
         following = list(islice(self._file, _BLOCK))
-        while block := following:
+        while following:
+            block = following
             following = list(islice(self._file, _BLOCK))
-            plain = None if texts else self._plain(block, numbers)
+            plain = None if words else self._plain(block, numbers)
             if plain is not None:
                 blocks.append(plain)
                 lines.append(line + 1 + np.arange(len(block)))
@@ -206,8 +243,9 @@ class _TableReader:
                 own = self._rows(block, line, last=not following)
                 blocks.append(self._block(own, numbers))
                 lines.append(np.array([number for number, _ in own], np.int64))
-                for name, words in texts.items():
-                    words.extend(intern(row[self._places[name][0]].strip()) for _, row in own)
+                for name, column in words.items():
+                    place = self._places[name][0]
+                    column.extend(intern(row[place].strip()) for _, row in own)
             line = line + len(block)
             size = size + blocks[-1].size
             if size > VALUES_MAX:
@@ -215,26 +253,7 @@ class _TableReader:
                     f"{self._path}:{line}: more than {VALUES_MAX} values, the limit"
                 )
         values = np.concatenate(blocks) if blocks else np.empty((0, len(numbers)))
-        columns = {name: np.ascontiguousarray(values[:, k]) for k, name in enumerate(numbers)}
-        if TIME not in columns:
-            columns[TIME] = self._mapping.step * np.arange(len(values), dtype=np.float64)
-        spoken = {name: tuple(each) for name, each in texts.items()}
-        still = not (np.diff(columns[TIME]) > 0.0).all()
-        if still and not (kept := _once(values, spoken)).all():
-            self._problems.append(f"{np.count_nonzero(~kept)} rows repeat the one before: left out")
-            columns = {name: each[kept] for name, each in columns.items()}
-            spoken = {name: tuple(compress(each, kept)) for name, each in spoken.items()}
-            lines = [np.concatenate(lines)[kept]]
-        time = columns.pop(TIME)
-        self._check_time(time, lines)
-        columns = multiplied(columns, self._mapping)
-        if self._maker is not None:
-            columns, note = self._maker.proved(columns, f"{self._path}:{self._begin}")
-            self._problems.append(note)
-        texts_of = MappingProxyType(spoken)
-        problems = (*self._problems, *_not_read(self._headings, self._places), *_missing(columns))
-        sampled = self._mapping.sampled
-        return Trace(str(self._path), time, MappingProxyType(columns), texts_of, problems, sampled)
+        return values, {name: tuple(column) for name, column in words.items()}, lines
 
     def _rows(self, block: Sequence[str], before: int, last: bool) -> list[tuple[int, list[str]]]:
         """The lines of a block as rows of cells with their numbers; blank ones are none."""
