@@ -76,6 +76,7 @@ def test_the_front_is_printed_and_drawn(
     picture = tmp_path / "new" / "front.png"
     assert main(["ros", "front", "home", "park", "--points", "3", "--output", str(picture)]) == 0
     (asked,) = planner.asked
+    assert asked.blend == -1.0  # as the cell says
     assert (list(asked.stations), asked.front_points, asked.savings) == (["home", "park"], 3, True)
     shown = capsys.readouterr().out
     rows = [line.split() for line in shown.splitlines()]
@@ -95,9 +96,12 @@ def test_a_chosen_cycle_time_is_planned_too(
         "13",
         "--points",
         "3",
+        "--blend",
+        "0.05",
         "--output",
         str(tmp_path / "front.png"),
     ]
     assert main(arguments) == 0
     assert [asked.cycle_time for asked in planner.asked] == [0.0, 13.0]
+    assert [asked.blend for asked in planner.asked] == [0.05, 0.05]
     assert "chosen cycle time" in capsys.readouterr().out

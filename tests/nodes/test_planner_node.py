@@ -44,6 +44,7 @@ from ir_msgs.srv import (
 from ir_msgs_py.names import JOINT_NAMES
 from ir_msgs_py.ros.conversions import trajectory_from_msg
 from ir_msgs_py.ros.testing import PATIENCE
+from ir_planner import Planner
 from ir_planner.node.node import PlannerNode
 
 HOME = [0.0, -1.5707963267948966, 1.5707963267948966, 0.0, 0.0, 0.0]
@@ -285,6 +286,27 @@ def test_an_exported_program_is_what_its_fields_say(call: Call) -> None:
         answer = call(ExportProgram, "export_program", **chosen)
         assert answer.status.code != Status.SUCCESS
         assert said in answer.status.message
+
+
+def test_stops_are_passed_as_near_as_the_request_says(call: Call) -> None:
+    stops = ["home", "infeed_pick", "gauge_measure", "home"]
+    little = PlanOptions(max_iterations=20_000)
+    asked = {"stations": stops, "options": little, "savings": False}
+    standing = call(PlanProgram, "plan_program", **asked)
+    passing = call(PlanProgram, "plan_program", **asked, blend=0.05)
+    assert passing.status.code == Status.SUCCESS, passing.status.message
+    assert not any(step.passes for step in standing.movements)
+    passed = [name for step in passing.movements for name in step.passes]
+    assert passed == ["gauge_measure"]
+    assert passing.report.duration < standing.report.duration
+    by_library = Planner("demo", clock=lambda: 0.0).plan_program(
+        stations=tuple(stops), start="home", blend=0.05, max_iterations=20_000
+    )
+    assert passing.program_id == by_library.program_id
+    stored = call(GetProgram, "get_program", program_id=passing.program_id)
+    assert [list(step.passes) for step in stored.movements] == [
+        list(step.passes) for step in by_library.movements
+    ]
 
 
 def test_a_program_comes_with_its_savings_and_its_front(
@@ -774,6 +796,25 @@ BAD: list[tuple[str, Any, str, dict[str, Any], int, str]] = [
         {"stations": ["park"], "front_points": 51},
         -16,
         "50",
+    ),
+    *(
+        (
+            f"a blend of {blend:g}",
+            PlanProgram,
+            "plan_program",
+            {"stations": ["home", "park"], "blend": blend},
+            -16,
+            f"blend is {blend:g} m: it must be in [0, 1] m",
+        )
+        for blend in (-0.5, 1.5)
+    ),
+    (
+        "a blend of nan",
+        PlanProgram,
+        "plan_program",
+        {"stations": ["home", "park"], "blend": NAN},
+        -16,
+        "blend is nan m: it must be finite",
     ),
     ("negative pause", PlanStandby, "plan_standby", {"pause": -1.0}, -16, "-1"),
     ("nan pause", PlanStandby, "plan_standby", {"pause": NAN}, -16, "nan"),

@@ -18,12 +18,18 @@ from ir_cli.errors import CommandError, InputError, nearest, unknown_name
 from ir_cli.output import Row
 from ir_description import DescriptionError, UnknownNameError, load_cell
 from ir_krl import KrlError
-from ir_msgs_py.options import NO_TILT, OBJECTIVES, ROBOTS_TIME_VALUE, PlanOptions
+from ir_msgs_py.options import (
+    AS_THE_CELL_SAYS,
+    NO_TILT,
+    OBJECTIVES,
+    ROBOTS_TIME_VALUE,
+    PlanOptions,
+)
 from ir_msgs_py.report import TrajectoryReport
 from ir_msgs_py.savings import one_sided
 from ir_msgs_py.status import StatusCode
 from ir_planner import Goal, Planner, PlannerSettings, ProgramPlan, RequestError, parse_goal
-from ir_planner.program import AS_THE_CELL_SAYS, Progress
+from ir_planner.program import Progress
 from ir_values.arrays import FloatArray
 from ir_values.errors import InvalidValueError
 

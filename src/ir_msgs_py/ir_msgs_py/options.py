@@ -20,6 +20,8 @@ DEFAULT_SAFETY_DISTANCE = 0.02
 """The safety_distance [m] of who names none."""
 UP = (0.0, 0.0, 1.0)
 """The tilt_direction of who names none."""
+AS_THE_CELL_SAYS = -1.0
+"""The blend of a program's request that leaves it to the cell."""
 
 
 @typed_methods(InvalidValueError)

@@ -236,8 +236,7 @@ class PlannedMovement:
     what is attached while it runs ("gripper+part", "none"). wait_for: signals of the machines to
     wait for before; set_signals: to set after, "name=0" clears; states: of machines that it relies
     on, "lathe=door_open". since: signal that a pause is for, "" for none: it ends as long after
-    that was set as planned. passes: stops that it passes without standing still, which messages
-    don't carry.
+    that was set as planned. passes: stops that it passes without standing still.
     """
 
     kind: str

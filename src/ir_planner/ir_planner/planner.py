@@ -22,7 +22,12 @@ from ir_description.cell import VIA_TOLERANCE, CellPath, ToolTilt
 from ir_kernels import KernelError
 from ir_kernels.data import pose as rigid_pose
 from ir_msgs_py.cartesian import CartesianPath
-from ir_msgs_py.options import DEFAULT_SAFETY_DISTANCE, NO_TILT, PlanOptions
+from ir_msgs_py.options import (
+    AS_THE_CELL_SAYS,
+    DEFAULT_SAFETY_DISTANCE,
+    NO_TILT,
+    PlanOptions,
+)
 from ir_msgs_py.status import StatusCode
 from ir_msgs_py.trajectory import JointTrajectory
 from ir_planner import flexible
@@ -37,7 +42,6 @@ from ir_planner.configurations import (
 from ir_planner.current_cell import CurrentCell, DriverReports, ReadCell, read_cell_here
 from ir_planner.errors import RequestError, unfit, unknown_name
 from ir_planner.program import (
-    AS_THE_CELL_SAYS,
     PauseLengths,
     ProgramPlan,
     ProgramRequest,

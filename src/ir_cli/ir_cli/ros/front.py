@@ -10,6 +10,7 @@ from pathlib import Path
 
 from ir_cli.errors import CommandError
 from ir_cli.output import Progress, add_renamed, table
+from ir_cli.planning import add_blend
 from ir_msgs_py.options import PlanOptions
 from ir_msgs_py.ros.client import Client
 from ir_msgs_py.savings import ProgramPoint
@@ -93,6 +94,7 @@ def add_front(front: argparse.ArgumentParser) -> None:
     front.add_argument(
         "--points", type=int, default=12, help="programs of the front, at most 50 (12)"
     )
+    add_blend(front)
     front.add_argument("--seed", type=int, default=0, help="seed of the planner (0)")
     output = front.add_argument(
         "-o",
@@ -117,6 +119,7 @@ def run(arguments: argparse.Namespace) -> int:
             options=options,
             progress=lambda at: progress.update(f"{at.phase} {at.done}/{at.total}"),
             front_points=arguments.points,
+            blend=arguments.blend,
         )
         cheapest = min(free.front, key=lambda point: point.energy)
         choice = FrontProgram(
@@ -125,7 +128,11 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.cycle_time > 0.0:
             progress.update(f"cycle time {arguments.cycle_time:g} s")
             plan = client.plan_program(
-                arguments.stations, arguments.cycle_time, options, savings=False
+                arguments.stations,
+                arguments.cycle_time,
+                options,
+                savings=False,
+                blend=arguments.blend,
             )
             choice = FrontProgram(
                 "chosen cycle time", plan.report.duration, plan.report.energy, plan.program_id

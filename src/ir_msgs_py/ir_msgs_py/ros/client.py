@@ -33,7 +33,7 @@ from ir_msgs.srv import (
     SetCell,
 )
 from ir_msgs_py import names
-from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.options import AS_THE_CELL_SAYS, PlanOptions
 from ir_msgs_py.report import PlannedMovement, PlanningInfo, TrajectoryReport
 from ir_msgs_py.ros.conversions import (
     status_from_msg,
@@ -631,10 +631,12 @@ class Client:
         timeout: float = 600.0,
         savings: bool = True,
         front_points: int = 0,
+        blend: float = AS_THE_CELL_SAYS,
     ) -> ProgramAnswer:
         """Plan a program over stations (none: the cell's own); progress gets the action's feedback.
         savings: hold it against the common program; front_points: programs from the shortest cycle
-        time to twice the free one.
+        time to twice the free one; blend [m]: how near stops and ends of lines are passed where
+        nothing happens, -1: as the cell says.
         """
         goal = Plan.Goal(
             stations=list(stations),
@@ -642,6 +644,7 @@ class Client:
             options=plan_options_to_msg(options or PlanOptions()),
             savings=savings,
             front_points=front_points,
+            blend=blend,
         )
         result = self.send_goal(names.PLAN, goal, progress, timeout)
         _check(names.PLAN, result)

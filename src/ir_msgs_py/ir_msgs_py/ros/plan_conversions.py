@@ -184,6 +184,7 @@ def planned_movement_to_msg(
         wait_for=list(movement.wait_for),
         set_signals=list(movement.set_signals),
         states=list(movement.states),
+        passes=list(movement.passes),
     )
 
 
@@ -199,6 +200,7 @@ def planned_movement_from_msg(msg: PlannedMovementMsg) -> PlannedMovement:
         wait_for=tuple(msg.wait_for),
         set_signals=tuple(msg.set_signals),
         states=tuple(msg.states),
+        passes=tuple(msg.passes),
     )
 
 

@@ -381,6 +381,7 @@ class Requests:
             cancelled=cancelled,
             savings=request.savings,
             front_points=request.front_points,
+            blend=request.blend,
         )
         fill_program(response, plan, options.include_points)
         if plan.savings.available:

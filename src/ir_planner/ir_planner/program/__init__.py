@@ -10,7 +10,6 @@ from ir_planner.program.pause_lengths import PauseLengths, lengths_of
 from ir_planner.program.pauses import AUTO, Charge, PlannedPause, spent, switch_times
 from ir_planner.program.program import outlook, plan_program, prepared, program_of
 from ir_planner.program.request import (
-    AS_THE_CELL_SAYS,
     ProgramPlan,
     ProgramRequest,
     Progress,
@@ -40,7 +39,6 @@ from ir_planner.program.timeouts import Timeouts
 
 __all__ = [
     "ACROSS",
-    "AS_THE_CELL_SAYS",
     "AUTO",
     "ENTER",
     "LEAVE",

@@ -8,7 +8,7 @@ from ir_description import Cell, PowerData, ProgramStep
 from ir_description.cell import BLEND_MAX
 from ir_description.cell_review import CellFinding
 from ir_msgs_py.names import NO_LOAD
-from ir_msgs_py.options import PlanOptions
+from ir_msgs_py.options import AS_THE_CELL_SAYS, PlanOptions
 from ir_msgs_py.report import PlannedMovement, PlanningInfo, TrajectoryReport
 from ir_msgs_py.savings import ProgramSavings
 from ir_msgs_py.status import Status, StatusCode
@@ -25,8 +25,6 @@ from ir_values.arrays import FloatArray
 # What a program is asked as, and what its answer is.
 
 FRONT_MAX = 50
-AS_THE_CELL_SAYS = -1.0
-"""Blend of a request that leaves it to the cell."""
 NOT_ASKED = ProgramSavings(sentence="savings were not asked for")
 Progress = Callable[[str, int, int, float], None]  # phase, done, total, cost of the best chain
 

@@ -63,6 +63,7 @@ def movement_from(message: Any) -> PlannedMovement:
         wait_for=tuple(message.wait_for),
         set_signals=tuple(message.set_signals),
         since=getattr(message, "since", ""),  # older recordings have none
+        passes=tuple(getattr(message, "passes", ())),
     )
 
 
