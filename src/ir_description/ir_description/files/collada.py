@@ -118,22 +118,29 @@ class _Document:
         return self._meshes[name]
 
     def _faces(self, faces: Xml.Element) -> FloatArray:
+        """Triangles (T, 3, 3) of one element of faces: lists, strips or fans of corners, each of
+        which is a row of `stride` numbers, one of them its place.
+        """
         inputs = faces.findall("input")
         stride = max(int(each.get("offset", "0")) for each in inputs) + 1
         own = next(each for each in inputs if each.get("semantic") == "VERTEX")
         points = self._positions(_source(own, self._by_id))
         offset = int(own.get("offset", "0"))
-        rows = [np.array((p.text or "").split(), dtype=np.int64) for p in faces.iter("p")]
-        corners = [row.reshape(-1, stride)[:, offset] for row in rows]
+        corners = []
+        for element in faces.iter("p"):
+            row = np.array((element.text or "").split(), dtype=np.int64)
+            corners.append(row.reshape(-1, stride)[:, offset])
         if faces.tag == "triangles":
             index = np.concatenate(corners).reshape(-1, 3) if corners else np.zeros((0, 3), int)
         elif faces.tag == "polylist":
             counts = np.array((faces.findtext("vcount") or "").split(), dtype=np.int64)
             if counts.sum() != sum(map(len, corners)):
                 raise InvalidValueError("a <polylist> has another number of corners than it says")
-            index = _fans(np.split(np.concatenate(corners), np.cumsum(counts)[:-1]))
+            first_of_next = np.cumsum(counts)[:-1]
+            index = _fans(np.split(np.concatenate(corners), first_of_next))
         elif faces.tag == "tristrips":
-            index = np.concatenate([np.stack([c[:-2], c[1:-1], c[2:]], 1) for c in corners])
+            strips = [np.stack([c[:-2], c[1:-1], c[2:]], axis=1) for c in corners]
+            index = np.concatenate(strips)
         else:
             index = _fans(corners)
         if len(index) > TRIANGLES_MAX:

@@ -102,12 +102,21 @@ class _Solid:
 
 
 def winding(triangles: FloatArray, points: FloatArray) -> FloatArray:
-    """How often a closed mesh (T, 3, 3) winds about each point (N, 3): 1 inside, 0 outside."""
+    """How often a closed mesh (T, 3, 3) winds about each point (N, 3): 1 inside, 0 outside.
+
+    The sum of the solid angles of all triangles (Van Oosterom and Strackee, 1983), in chunks that
+    bound the memory.
+    """
     found = np.zeros(len(points))
     size = max(1, _CHUNK // len(triangles))
     for k in range(0, len(points), size):
-        a, b, c = (triangles[None, :, i] - points[k : k + size, None] for i in range(3))
-        la, lb, lc = (np.linalg.norm(each, axis=2) for each in (a, b, c))
+        seen_from = points[k : k + size, None]
+        a = triangles[None, :, 0] - seen_from
+        b = triangles[None, :, 1] - seen_from
+        c = triangles[None, :, 2] - seen_from
+        la = np.linalg.norm(a, axis=2)
+        lb = np.linalg.norm(b, axis=2)
+        lc = np.linalg.norm(c, axis=2)
         above = np.einsum("nti,nti->nt", a, np.cross(b, c))
         below = la * lb * lc + (a * b).sum(2) * lc + (b * c).sum(2) * la + (c * a).sum(2) * lb
         found[k : k + size] = np.arctan2(above, below).sum(axis=1) / (2.0 * np.pi)
@@ -511,9 +520,13 @@ def _with_few_faces(piece: FloatArray) -> FloatArray:
     where it is flattest, and all around.
     """
     hull = ConvexHull(piece)
-    a, b, c = (piece[hull.simplices[:, k]] for k in range(3))
+    a = piece[hull.simplices[:, 0]]
+    b = piece[hull.simplices[:, 1]]
+    c = piece[hull.simplices[:, 2]]
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     flattest = hull.equations[np.argsort(-area, kind="stable")[:_FLAT], :3]
+
+    # directions spread evenly over a sphere: a spiral by the golden angle
     k = np.arange(_AROUND) + 0.5
     height = 1.0 - 2.0 * k / _AROUND
     turn = np.pi * (1.0 + np.sqrt(5.0)) * k

@@ -175,7 +175,12 @@ def _voxels(points: FloatArray, voxel: float) -> tuple[IntArray, IntArray]:
 def _columns(
     heights: FloatArray, pitch: float, voxel: float
 ) -> tuple[IntArray, IntArray, tuple[str, ...]]:
-    """Columns of cubes from the lowest height up to the highest sample above each."""
+    """Columns of cubes from the lowest height up to the highest sample above each: their low and
+    high corners (C, 3) as numbers of cubes, and notes.
+
+    heights (rows, columns) [m], NaN where nothing was seen; pitch [m] between samples; voxel [m]:
+    edge of a cube. A sample stands for the square of one pitch around it.
+    """
     seen = np.isfinite(heights)
     row, column = np.nonzero(seen)
     top = heights[seen]
@@ -184,9 +189,10 @@ def _columns(
     first = np.floor((places - pitch / 2.0) / voxel).astype(np.int64)
     last = np.ceil((places + pitch / 2.0) / voxel).astype(np.int64) - 1
     count = int((last - first).max()) + 1
-    if count > 2 and len(top) * count * count > POINTS_MAX:
+    covered_at_most = len(top) * count * count
+    if count > 2 and covered_at_most > POINTS_MAX:
         raise InvalidValueError(
-            f"the height map has {len(top) * count * count} columns of {voxel:g} m, must have at "
+            f"the height map has {covered_at_most} columns of {voxel:g} m, must have at "
             f"most {POINTS_MAX}: take a larger voxel"
         )
     level = np.ceil(top / voxel).astype(np.int64)
@@ -198,6 +204,8 @@ def _columns(
             covered = np.all(cell <= last, axis=1)
             cells.append(cell[covered])
             levels.append(level[covered])
+
+    # several samples may cover a cell: the highest counts
     unique, owner = np.unique(np.concatenate(cells), axis=0, return_inverse=True)
     highest = np.full(len(unique), np.iinfo(np.int64).min)
     np.maximum.at(highest, owner.reshape(-1), np.concatenate(levels))

@@ -132,14 +132,23 @@ def robot_of(root: Item, folder: Path | None) -> RobotModel:
 
 
 def _robot(root: Item) -> RobotModel:
+    """The robot of a file's tree: angles are in degrees there, in radians here."""
     top = root.table(_KEYS, _OPTIONAL)
     top["format"].choice((FORMAT,))
     joints = top["joints"].table(_JOINT_KEYS, ("rotation_abc_deg",))
     joint_names = tuple(item.name() for item in joints["names"].list(1, 16))
     n = len(joint_names)
     drives = top["drives"].table(DRIVE_KEYS, (COUPLING,))
-    links = [_link(item) for item in top["links"].list(n + 1, n + 1)]
-    link_names = tuple(name for name, *_ in links)
+    link_names: tuple[str, ...] = ()
+    masses = []
+    coms = []
+    inertias = []
+    for item in top["links"].list(n + 1, n + 1):
+        name, mass, com, inertia = _link(item)
+        link_names = (*link_names, name)
+        masses.append(mass)
+        coms.append(com)
+        inertias.append(inertia)
     capsules = tuple(_capsule(item, link_names) for item in top["capsules"].list(0, 200))
     pairs = [_pair(item) for item in top["self_pairs"].list(0, 1000)]
     gear_ratio = _joint_values(drives, "gear_ratio", n)
@@ -156,9 +165,9 @@ def _robot(root: Item) -> RobotModel:
             velocity_max=np.radians(_joint_values(joints, "velocity_deg_s", n)),
             acceleration_max=_joint_values(joints, "acceleration_rad_s2", n),
             jerk_max=np.radians(_joint_values(joints, "jerk_deg_s3", n)),
-            link_mass=np.array([mass for _, mass, _, _ in links]),
-            link_com=np.array([com for _, _, com, _ in links]),
-            link_inertia=np.array([inertia for *_, inertia in links]),
+            link_mass=np.array(masses),
+            link_com=np.array(coms),
+            link_inertia=np.array(inertias),
             gear_ratio=gear_ratio,
             reflected_inertia=_joint_values(drives, "reflected_inertia_kgm2", n),
             friction_viscous=_joint_values(drives, "friction_viscous_nms_rad", n),

@@ -41,31 +41,42 @@ def robot_urdf(
     Each load is a link `load_<name>` fixed to the flange. Without a tcp it stands at the flange.
     With the base's pose (4, 4) in the cell, the root is the frame `cell`.
     """
-    loads = () if load is None else (load,) if isinstance(load, Load) else tuple(load)
+    loads: tuple[Load, ...] = ()
+    if isinstance(load, Load):
+        loads = (load,)
+    elif load is not None:
+        loads = tuple(load)
+    here = (0.0, 0.0, 0.0)
     root = Xml.Element("robot", name=robot.name)
     for name, colour in _COLOURS.items():
-        Xml.SubElement(Xml.SubElement(root, "material", name=name), "color", rgba=colour)
+        material = Xml.SubElement(root, "material", name=name)
+        Xml.SubElement(material, "color", rgba=colour)
     if base_pose is not None:
         Xml.SubElement(root, "link", name=WORLD_FRAME)
         base = robot.link_names[0]
-        _fixed(root, base, WORLD_FRAME, base_pose[:3, 3], _rpy(base_pose[:3, :3]))
+        turned = _rpy(base_pose[:3, :3])
+        _fixed(root, child=base, parent=WORLD_FRAME, xyz=base_pose[:3, 3], rpy=turned)
     for i, name in enumerate(robot.link_names):
-        capsules = [capsule for capsule in robot.capsules if capsule.link == i]
-        mass = float(robot.link_mass[i])
-        com = robot.link_com[i]
-        inertia = robot.link_inertia[i]
-        _link(root, name, mass, com, inertia, capsules, "link")
+        _link(
+            root,
+            name,
+            mass=float(robot.link_mass[i]),
+            com=robot.link_com[i],
+            inertia=robot.link_inertia[i],
+            capsules=[capsule for capsule in robot.capsules if capsule.link == i],
+            material="link",
+        )
     for i in range(robot.n):
         _joint(root, robot, i)
     last = robot.link_names[-1]
-    _frame(root, "flange", last, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    _frame(root, "tool0", "flange", (0.0, 0.0, 0.0), _TOOL0)
+    _frame(root, "flange", parent=last, xyz=here, rpy=here)
+    _frame(root, "tool0", parent="flange", xyz=here, rpy=_TOOL0)
     pose = np.eye(4) if tcp is None else tcp
-    _frame(root, "tcp", "flange", pose[:3, 3], _rpy(pose[:3, :3]))
+    _frame(root, "tcp", parent="flange", xyz=pose[:3, 3], rpy=_rpy(pose[:3, :3]))
     for item in loads:
         name = f"load_{item.name}"
-        _link(root, name, item.mass, item.com, item.inertia, item.capsules, "load")
-        _fixed(root, name, "flange", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        _link(root, name, item.mass, item.com, item.inertia, item.capsules, material="load")
+        _fixed(root, child=name, parent="flange", xyz=here, rpy=here)
     Xml.indent(root)
     return '<?xml version="1.0"?>\n' + Xml.tostring(root, encoding="unicode") + "\n"
 
@@ -100,18 +111,20 @@ def _link(
 
 
 def _capsule(link: Xml.Element, kind: str, capsule: Capsule, material: str) -> None:
+    """Add a capsule as two spheres and the cylinder between them: URDF has no capsule."""
     axis = capsule.p1 - capsule.p0
     length = float(portable.norm(axis))
     ends = (capsule.p0, capsule.p1) if length > 0.0 else (capsule.p0,)
-    for i, centre in enumerate(ends):
-        geometry = _shape(link, kind, f"{capsule.name}_end_{i}", centre, (0.0, 0.0, 0.0), material)
-        Xml.SubElement(geometry, "sphere", radius=repr(capsule.radius))
+    for i, end in enumerate(ends):
+        name = f"{capsule.name}_end_{i}"
+        sphere = _shape(link, kind, name, xyz=end, rpy=(0.0, 0.0, 0.0), material=material)
+        Xml.SubElement(sphere, "sphere", radius=repr(capsule.radius))
     if length > 0.0:
-        d = axis / length
-        rpy = (0.0, math.acos(min(1.0, max(-1.0, d[2]))), math.atan2(d[1], d[0]))
-        centre = (capsule.p0 + capsule.p1) / 2.0
-        geometry = _shape(link, kind, capsule.name, centre, rpy, material)
-        Xml.SubElement(geometry, "cylinder", radius=repr(capsule.radius), length=repr(length))
+        x, y, z = axis / length
+        rpy = (0.0, math.acos(min(1.0, max(-1.0, z))), math.atan2(y, x))
+        middle = (capsule.p0 + capsule.p1) / 2.0
+        between = _shape(link, kind, capsule.name, xyz=middle, rpy=rpy, material=material)
+        Xml.SubElement(between, "cylinder", radius=repr(capsule.radius), length=repr(length))
 
 
 def _shape(

@@ -42,25 +42,31 @@ def on_rail(arm: RobotModel, rail: Rail) -> RobotModel:
         raise InvalidValueError(f"rail {rail.name}: the robot has a joint of this name")
     if RAIL_LINK in arm.link_names:
         raise InvalidValueError(f"the robot has a link {RAIL_LINK}, which the rail's own would be")
+
+    # figures of the drive that aren't given are estimated from the mass that it moves
     moved = float(arm.link_mass.sum()) + arm.rated_payload + rail.carriage_mass
     coulomb = rail.friction_coulomb or _ROLLING * moved * _GRAVITY
     viscous = rail.friction_viscous or _VISCOUS * moved * _GRAVITY / rail.velocity
     reflected = rail.reflected_mass or _ROTOR * moved
     needed = (moved + reflected) * rail.acceleration + coulomb + viscous * rail.velocity
     force = rail.force or _SURPLUS * needed
+    jerk = rail.jerk or rail.acceleration / _JERK_TIME
+    ratio = rail.gear_ratio or _MOTOR_SPEED / rail.velocity
     speeds = rail.velocity * np.linspace(_KNEE, 1.0, arm.envelope_speed.shape[1])
     falls = np.linspace(1.0, _AT_FULL_SPEED, len(speeds))
     available = force * falls if rail.power == 0.0 else np.minimum(force, rail.power / speeds)
+
+    # every link, joint and capsule of the arm has a number more than before
     balance = arm.counterbalance
-    ratio = rail.gear_ratio or _MOTOR_SPEED / rail.velocity
+    if balance is not None:
+        balance = replace(balance, joint=balance.joint + 1)
     turns = np.eye(arm.n + 1)
     turns[1:, 1:] = arm.motor_turns
-    pairs = tuple(
-        (plate.name, own.name)
-        for plate in rail.capsules
-        for own in arm.capsules
-        if own.link >= _FIRST_PAIR
-    )
+    arm_capsules = tuple(replace(own, link=own.link + 1) for own in arm.capsules)
+    carriage = [rail.carriage_mass, arm.link_mass[0] + rail.carriage_mass]
+    pairs = []
+    for plate in rail.capsules:
+        pairs += [(plate.name, own.name) for own in arm.capsules if own.link >= _FIRST_PAIR]
     place = f"links.{RAIL_LINK}"
     marks = {f"{place}.{figure}": _ESTIMATED for figure in ("mass_kg", "com_m", "inertia_kgm2")}
     return replace(
@@ -75,10 +81,8 @@ def on_rail(arm: RobotModel, rail: Rail) -> RobotModel:
         position_max=np.append(rail.high, arm.position_max),
         velocity_max=np.append(rail.velocity, arm.velocity_max),
         acceleration_max=np.append(rail.acceleration, arm.acceleration_max),
-        jerk_max=np.append(rail.jerk or rail.acceleration / _JERK_TIME, arm.jerk_max),
-        link_mass=np.concatenate(
-            [[rail.carriage_mass, arm.link_mass[0] + rail.carriage_mass], arm.link_mass[1:]]
-        ),
+        jerk_max=np.append(jerk, arm.jerk_max),
+        link_mass=np.concatenate([carriage, arm.link_mass[1:]]),
         link_com=np.concatenate([np.zeros((1, 3)), arm.link_com]),
         link_inertia=np.concatenate([arm.link_inertia[:1], arm.link_inertia]),
         gear_ratio=np.append(ratio, arm.gear_ratio),
@@ -92,10 +96,10 @@ def on_rail(arm: RobotModel, rail: Rail) -> RobotModel:
         idle_loss=np.append(0.0, arm.idle_loss),
         envelope_speed=np.concatenate([speeds[None], arm.envelope_speed]),
         envelope_torque=np.concatenate([[[force, *available]], arm.envelope_torque]),
-        counterbalance=None if balance is None else replace(balance, joint=balance.joint + 1),
-        capsules=(*rail.capsules, *(replace(c, link=c.link + 1) for c in arm.capsules)),
+        counterbalance=balance,
+        capsules=(*rail.capsules, *arm_capsules),
         self_pairs=(*pairs, *arm.self_pairs),
-        load_self_capsules=(*(c.name for c in rail.capsules), *arm.load_self_capsules),
+        load_self_capsules=(*(plate.name for plate in rail.capsules), *arm.load_self_capsules),
         machine_home=np.append(rail.home, arm.machine_home),
         motor_turns=turns,
     )

@@ -264,20 +264,22 @@ class _Patches(NamedTuple):
         return _Patches(along, around, (a, b), 0.5 * self.radius)
 
     def points(self, fit: CapsuleFit) -> FloatArray:
-        """Their middles (N, 3)."""
+        """Their middles (N, 3) [m] on a capsule: a meridian runs over one cap, along the cylinder
+        and over the other cap.
+        """
         axis = fit.p1 - fit.p0
         length = float(np.linalg.norm(axis))
         z = axis / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
         x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
         x /= np.linalg.norm(x)
+        y = np.cross(z, x)
         quarter = 0.5 * np.pi * fit.radius
         angle = (np.minimum(self.along, quarter) - quarter) / fit.radius
         angle += np.maximum(self.along - quarter - length, 0.0) / fit.radius
         height = np.clip(self.along - quarter, 0.0, length) + fit.radius * np.sin(angle)
-        side = np.cos(self.around)[:, None] * x + np.sin(self.around)[:, None] * np.cross(z, x)
-        return np.asarray(
-            fit.p0 + height[:, None] * z + (fit.radius * np.cos(angle))[:, None] * side
-        )
+        side = np.cos(self.around)[:, None] * x + np.sin(self.around)[:, None] * y
+        beside = fit.radius * np.cos(angle)
+        return np.asarray(fit.p0 + height[:, None] * z + beside[:, None] * side)
 
 
 def beside_axis(points: FloatArray, p0: FloatArray, p1: FloatArray) -> FloatArray:
@@ -308,6 +310,8 @@ def _best(
 ) -> CapsuleFit:
     """The smallest capsule in one of a few directions around points (N, 3), as `outermost` (M, 3)
     of them tell, but for its overhang: a line through the middle of the projected points.
+
+    The directions are the principal ones, the frame's, and `axis` (3,) where it is given.
     """
     directions = np.concatenate([_principal(outermost), np.eye(3)])
     if axis is not None and np.linalg.norm(axis) > 1e-9:
@@ -317,18 +321,21 @@ def _best(
     centre = flat.mean(axis=1)
     rows = np.arange(len(directions))
     for k in range(1, rounds):  # Badoiu and Clarkson: towards the farthest point, ever shorter
-        far = flat[rows, np.argmax(_square(flat - centre[:, None]), axis=1)]
-        centre = centre + (far - centre) / (k + 1)
+        farthest = np.argmax(_square(flat - centre[:, None]), axis=1)
+        centre = centre + (flat[rows, farthest] - centre) / (k + 1)
     beside = _square(flat - centre[:, None])
     square = beside.max(axis=1, keepdims=True)
+
+    # the ends: as far apart as the caps' spheres leave no point outside
     cap = np.sqrt(square - beside)
     low = (along + cap).min(axis=1)
     high = (along - cap).max(axis=1)
     middle = centre + 0.5 * (low + high)[:, None] * directions
     ball = np.sqrt(_square(outermost - middle[:, None]).max(axis=1))
     radius = np.where(low > high, ball, np.sqrt(square[:, 0]))
-    line = int(np.argmin(_volume(np.maximum(high - low, 0.0), radius)))
-    return _capsule_along(points, centre[line], directions[line])
+    volume = _volume(np.maximum(high - low, 0.0), radius)
+    smallest = int(np.argmin(volume))
+    return _capsule_along(points, centre[smallest], directions[smallest])
 
 
 def _square(vectors: FloatArray) -> FloatArray:

@@ -154,27 +154,36 @@ def urdf_arm(text: str, source: str, tip: str = "", without: Collection[str] = (
     moving = _axes(path, source, under)
     tree = replace(read, above={**read.above, **{joint.child: joint for joint in path}})
     base = path[0].parent
-    before = [] if under else tree.path(base)
-    placed = _placed(before, path)
+    below_base = tree.path(base)
+    fixed_before = [] if under else below_base
+    placed = _placed(fixed_before, path)
     frames = _frames(path, moving, placed)
-    planned = {joint.name for joint in (*tree.path(base), *path)}
+    planned = {joint.name for joint in (*below_base, *path)}
     _check_without(without, [base, *_chain(path)], tree, source)
+
+    # each link with all that is fixed to it, in its own frame
     gathering = _Gathering(tree, without, planned, source)
     links = []
     names = [base, *(joint.child for joint in moving)]
-    for name, group, frame in zip(names, _groups(path, before), frames, strict=True):
+    for name, group, frame in zip(names, _groups(path, fixed_before), frames, strict=True):
         inverse = np.linalg.inv(frame)
-        links.append(gathering.link(name, group, [inverse @ placed[each] for each in group]))
-    origin = np.array([b[:3, 3] - a[:3, 3] for a, b in pairwise(frames)])
-    turned = [
-        frame[:3, :3].T @ placed[joint.child][:3, :3] @ joint.axis
-        for joint, frame in zip(moving, frames[1:], strict=True)
-    ]
+        poses = [inverse @ placed[each] for each in group]
+        links.append(gathering.link(name, group, poses))
+
+    origins = []
+    for before, after in pairwise(frames):
+        origins.append(after[:3, 3] - before[:3, 3])
+    origin = np.array(origins)
+    turned = []
+    for joint, frame in zip(moving, frames[1:], strict=True):
+        to_frame = frame[:3, :3].T @ placed[joint.child][:3, :3]
+        turned.append(to_frame @ joint.axis)
     axis = np.array([_squared(each, EXACT) for each in turned])
     beyond = np.cumsum(np.linalg.norm(origin[::-1], axis=1))[::-1]  # from each joint on
-    rounding += float((beyond + _BODY) @ np.linalg.norm(axis - np.array(turned), axis=1))
+    changed = np.linalg.norm(axis - np.array(turned), axis=1)
+    rounding += float((beyond + _BODY) @ changed)
     couplings = coupling_notes(read.transmissions, [joint.name for joint in moving])
-    notes = [*read.notes, *_below_base(tree.path(base)), *gathering.notes, *couplings]
+    notes = [*read.notes, *_below_base(below_base), *gathering.notes, *couplings]
     notes += [_rail_note(joint, tree) for joint in under]
     if rounding > SAID:
         notes.append(
@@ -182,16 +191,16 @@ def urdf_arm(text: str, source: str, tip: str = "", without: Collection[str] = (
             f"arm by at most {1e6 * rounding:.2g} um, by which all capsules are wider"
         )
     return UrdfArm(
-        tree.name,
-        tuple(moving),
-        origin,
-        axis / np.linalg.norm(axis, axis=1, keepdims=True),
-        frames[-1][:3, :3],
-        tuple(links),
-        rounding if rounding > SAID else 0.0,
-        tuple(notes),
-        frozenset(gathering.leaders),
-        source,
+        name=tree.name,
+        joints=tuple(moving),
+        origin=origin,
+        axis=axis / np.linalg.norm(axis, axis=1, keepdims=True),
+        flange=frames[-1][:3, :3],
+        links=tuple(links),
+        rounding=rounding if rounding > SAID else 0.0,
+        notes=tuple(notes),
+        leaders=frozenset(gathering.leaders),
+        source=source,
     )
 
 
@@ -397,7 +406,7 @@ def _frames(
     path: Sequence[UrdfJoint], moving: Sequence[UrdfJoint], placed: dict[str, FloatArray]
 ) -> list[FloatArray]:
     """Poses (4, 4) of the 7 frames in the base: where the joints are, the last where the flange
-    is.
+    is, with its x along the last axis.
     """
     frames = [np.eye(4)]
     for joint in moving:
@@ -406,14 +415,19 @@ def _frames(
         frames.append(frame)
     tip = placed[path[-1].child]
     last = placed[moving[-1].child]
-    z = last[:3, :3] @ moving[-1].axis
-    frames[-1][:3, 3] = last[:3, 3] + ((tip[:3, 3] - last[:3, 3]) @ z) * z
-    R = tip[:3, :3] @ TOOL0[:3, :3].T if path[-1].child.endswith("tool0") else tip[:3, :3]
-    if abs(abs(R[:, 0] @ z) - 1.0) > EXACT:  # not a flange by its x: build one
-        out = z if (tip[:3, 3] - last[:3, 3]) @ z >= 0.0 else -z
-        helper = np.eye(3)[2] if abs(out[2]) < 0.9 else np.eye(3)[1]
-        y = np.cross(helper, out) / np.linalg.norm(np.cross(helper, out))
-        R = np.stack([out, y, np.cross(out, y)], axis=1)
+    axis = last[:3, :3] @ moving[-1].axis
+    from_last = tip[:3, 3] - last[:3, 3]
+    outwards = from_last @ axis
+    frames[-1][:3, 3] = last[:3, 3] + outwards * axis
+    R = tip[:3, :3]
+    if path[-1].child.endswith("tool0"):
+        R = tip[:3, :3] @ TOOL0[:3, :3].T
+    if abs(abs(R[:, 0] @ axis) - 1.0) > EXACT:  # not a flange by its x: build one
+        x = axis if outwards >= 0.0 else -axis
+        helper = np.eye(3)[2] if abs(x[2]) < 0.9 else np.eye(3)[1]
+        across = np.cross(helper, x)
+        y = across / np.linalg.norm(across)
+        R = np.stack([x, y, np.cross(x, y)], axis=1)
     frames[-1][:3, :3] = _squared(R, SAID)
     return frames
 
