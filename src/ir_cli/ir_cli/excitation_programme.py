@@ -326,18 +326,19 @@ class ExcitationRequest:
 
 
 def plan_programme(planner: Planner, prior: PowerParameters, asked: ExcitationRequest) -> Programme:
-    """The programme of a cell; CommandError where nothing in it can move."""
+    """The programme of a cell: rests in all modes, then the excursions that tell most about the
+    parameters. CommandError where nothing in it can move.
+    """
     cell = planner.cell
     link = cell.robot.controller.dc_link
     design = Design(PowerModel(cell.robot, link, cell.base_pose, prior), prior)
     loads = load_texts(planner)
-    places = postures(planner, loads[-1], asked.margin, asked.postures, asked.seed)
-    places = _reachable(planner, places, loads[-1], asked)
-    pool = [
-        each
-        for load in loads
-        for each in excursions(planner, places, load, asked.margin, asked.seed)
-    ]
+    heaviest = loads[-1]
+    places = postures(planner, heaviest, asked.margin, asked.postures, asked.seed)
+    places = _reachable(planner, places, heaviest, asked)
+    pool: list[Excursion] = []
+    for load in loads:
+        pool += excursions(planner, places, load, asked.margin, asked.seed)
     if not pool:
         raise CommandError(f"no excursion from {len(places)} postures of {cell.name} is certified")
     held = {load: planner.scene(load).loads for load in loads}
@@ -345,12 +346,12 @@ def plan_programme(planner: Planner, prior: PowerParameters, asked: ExcitationRe
     modes = [mode for mode in known if mode != DEEP or asked.hibernate]
     for mode in modes:
         design.rest(mode, held[loads[0]], STAY, places[0])
-    chosen = design.choose(pool, [design.of(each, held[each.load]) for each in pool], asked.seconds)
+    candidates = [design.of(each, held[each.load]) for each in pool]
+    chosen = design.choose(pool, candidates, asked.seconds)
     steps: list[ProgrammeStep] = []
     for load in loads:
-        steps += _with_load(
-            planner, places, [each for each in chosen if each.load == load], load, asked
-        )
+        own = [each for each in chosen if each.load == load]
+        steps += _with_load(planner, places, own, load, asked)
     stays = [ProgrammeStep(f"in {mode}", loads[0], mode=mode, seconds=STAY) for mode in modes]
     return Programme((*stays, *steps), design.identified())
 

@@ -62,14 +62,23 @@ def second_posture(robot: RobotModel) -> FloatArray:
     chain = Chain(robot)
     model = CollisionModel(chain, robot.capsules, (), robot.self_pairs)
     own = {frozenset(each[:2]): each.distance for each in robot.reduced_distances}
-    kept = np.array([min(SAFETY, own.get(frozenset((a, b)), SAFETY)) for _, a, b in model.pairs])
-    reduced = np.array([frozenset((a, b)) in own for _, a, b in model.pairs], dtype=bool)
-    kept += np.where(reduced, _NARROW, _ROOM)
-    steps = np.array([share * _STEP * sign for share in _SHARES for sign in _SIGNS])
+    distances = []
+    for _, first, second in model.pairs:
+        reduced = own.get(frozenset((first, second)))
+        if reduced is None:
+            distances.append(SAFETY + _ROOM)
+        else:
+            distances.append(min(SAFETY, reduced) + _NARROW)
+    kept = np.array(distances)
+
+    # small steps of all axes from machine home first, then anything
+    steps = []
+    for size in _SHARES:
+        steps += [size * _STEP * sign for sign in _SIGNS]
     drawn = np.random.default_rng(0).uniform(-1.0, 1.0, (_DRAWN, robot.n))
     low = robot.position_min + _INSIDE
     high = robot.position_max - _INSIDE
-    q = np.clip(robot.machine_home + np.concatenate([steps, drawn]), low, high)
+    q = np.clip(robot.machine_home + np.concatenate([np.array(steps), drawn]), low, high)
     others = [each for each in robot.capsules if each.link > 1]
     floor = floor_below(chain, robot.capsules) + SAFETY + _ROOM
 

@@ -87,6 +87,9 @@ def made_robot(source: RobotSource) -> MadeRobot:
 
 
 def _made(source: RobotSource) -> MadeRobot:
+    """The robot of a URDF and its sheet, step by step: arm, masses, capsules, the pairs of these
+    that are checked, and the file that all of it is written to, read again.
+    """
     urdf = source.urdf
     arm = urdf_arm(urdf_text(source), str(urdf), source.tip, source.without)
     _check_axes(arm)
@@ -97,26 +100,34 @@ def _made(source: RobotSource) -> MadeRobot:
     arm, masses = with_masses(arm, bodies, source.mass)
     sheet = _sheet(source, arm)
     names = link_names(arm, sheet)
-    low, high = (np.radians(sheet.values[f"position_{end}_deg"].numbers) for end in ("min", "max"))
+    low = np.radians(sheet.values["position_min_deg"].numbers)
+    high = np.radians(sheet.values["position_max_deg"].numbers)
     check_leaders(arm, low, high)
     given = sheet.values.get("machine_home_deg")
     home = None if given is None else np.asarray(np.radians(given.numbers), dtype=np.float64)
     shapes = capsules_of(arm, bodies, names, sheet.radii)
     pairs = pairs_of(arm, shapes.capsules, bodies, low, high, home)
-    if pairs.unclear:
-        more = capsules_of(arm, bodies, names, sheet.radii, shapes, pairs.unclear)
-        tighter = pairs_of(arm, more.capsules, bodies, low, high, home, pairs.unclear)
+    if pairs.unclear:  # more and tighter capsules, where they leave the arm as many postures
+        more = capsules_of(arm, bodies, names, sheet.radii, before=shapes, finer=pairs.unclear)
+        tighter = pairs_of(arm, more.capsules, bodies, low, high, home, finer=pairs.unclear)
         if tighter.left >= pairs.left:
             shapes = more
             pairs = tighter
     notes = [*arm.notes, *meshes.notes, *masses, *sheet.notes]
     if given is None:
         sheet = with_home(sheet, _home(arm, sheet, shapes, pairs, (low, high)))
-    text = robot_text(
-        arm, sheet, shapes.capsules, pairs.pairs, pairs.reduced, _comments(source, shapes, notes)
-    )
+    comments = _comments(source, shapes, notes)
+    text = robot_text(arm, sheet, shapes.capsules, pairs.pairs, pairs.reduced, comments)
     robot = robot_from_yaml(text, f"the robot made from {urdf}", _folder(source))
-    return MadeRobot(text, robot, arm, bodies, shapes, pairs, tuple(notes))
+    return MadeRobot(
+        text=text,
+        robot=robot,
+        arm=arm,
+        bodies=bodies,
+        shapes=shapes,
+        pairs=pairs,
+        notes=tuple(notes),
+    )
 
 
 def _check_axes(arm: UrdfArm) -> None:

@@ -72,6 +72,15 @@ class Pairs(NamedTuple):
     left: float = 1.0
 
 
+def _far_pairs(capsules: Sequence[Capsule]) -> list[tuple[str, str]]:
+    """Names of two capsules each, of links that no joint connects."""
+    found = []
+    for one, other in itertools.combinations(capsules, 2):
+        if abs(one.link - other.link) > 1:
+            found.append((one.name, other.name))
+    return found
+
+
 def pairs_of(
     arm: UrdfArm,
     capsules: tuple[Capsule, ...],
@@ -81,47 +90,52 @@ def pairs_of(
     home: FloatArray | None,
     finer: Set[tuple[int, int]] = frozenset(),
 ) -> Pairs:
-    """All pairs of capsules of links that are no neighbours; home: a given one [rad]; finer: pairs
-    of links whose surfaces are looked at in small pieces.
+    """All pairs of capsules of links that are no neighbours, within limits low and high [rad];
+    home: a given posture [rad]; finer: pairs of links whose surfaces are looked at in small pieces.
+
+    A pair that is too near in many random postures gets a distance of its own, by the surfaces
+    within its capsules.
     """
-    far = [
-        (a.name, b.name)
-        for k, a in enumerate(capsules)
-        for b in capsules[k + 1 :]
-        if abs(a.link - b.link) > 1
-    ]
+    far = _far_pairs(capsules)
     chain = Chain(arm)
     model = CollisionModel(chain, capsules, (), far)
     q = np.random.default_rng(0).uniform(low, high, (POSTURES, len(low)))
     distance = model.distances(q)
     named = {capsule.name: capsule for capsule in capsules}
-    surfaces = _Surfaces(arm, capsules, bodies, {link for pair in finer for link in pair})
+    finer_links = {link for pair in finer for link in pair}
+    surfaces = _Surfaces(arm, capsules, bodies, finer_links)
+
+    # pairs that are too near in many postures, by the links that they belong to
     groups: dict[tuple[int, int], list[int]] = {}
     for z, (_, first, second) in enumerate(model.pairs):
-        if float((distance[:, z] <= SAFETY).mean()) > NEAR:
-            one, other = sorted((named[first].link, named[second].link))
-            groups.setdefault((one, other), []).append(z)
+        share_too_near = float((distance[:, z] <= SAFETY).mean())
+        if share_too_near > NEAR:
+            one, other_link = sorted((named[first].link, named[second].link))
+            groups.setdefault((one, other_link), []).append(z)
+
     reduced = []
     unclear: set[tuple[int, int]] = set()
     least = np.full(len(model.pairs), SAFETY)
     for links, near in groups.items():
         rings = _Rings(chain, *links, surfaces, q)
-        own = []
+        distances = []
+        reasons = []
         for z in near:
-            pair = (named[name] for name in model.pairs[z][1:])
-            lower, upper = sorted(pair, key=lambda each: each.link)
-            own.append(
-                _own_distance(distance[:, z], _Meeting(chain, lower, upper, rings, q, (low, high)))
-            )
-        kept = np.array([each for each, _ in own])
+            _, first, second = model.pairs[z]
+            lower, upper = sorted((named[first], named[second]), key=lambda each: each.link)
+            meeting = _Meeting(chain, lower, upper, rings, q, (low, high))
+            own_distance, reason = _own_distance(distance[:, z], meeting)
+            distances.append(own_distance)
+            reasons.append(reason)
+        kept = np.array(distances)
         least[near] = kept
         left = float((distance[:, near] > kept).all(axis=1).mean())
         free_at_home = home is None or (model.distances(home[None])[0, near] > kept).all()
         if left < LEAST_LEFT or not free_at_home:
             unclear.add(links)
-        for z, (each, reason) in zip(near, own, strict=True):
+        for z, own_distance, reason in zip(near, distances, reasons, strict=True):
             said = f"{reason}; leaves {100.0 * left:.1f} %" if left < LEAST_LEFT else reason
-            reduced.append(ReducedDistance(*model.pairs[z][1:], each, said))
+            reduced.append(ReducedDistance(*model.pairs[z][1:], own_distance, said))
     leaves = float((distance > least).all(axis=1).mean())
     if home is not None and (model.distances(home[None])[0] <= least).any():
         leaves = 0.0

@@ -78,14 +78,21 @@ class MeasuredMotion:
 def smoothed(
     names: tuple[str, ...], time: FloatArray, positions: FloatArray, bandwidth: float
 ) -> JointTrajectory:
-    """The motion of positions (N, n) at time (N,) [s], smoothed at `bandwidth` [Hz]."""
-    step = max(0.5 / bandwidth, _ROWS_PER_KNOT * float(np.median(np.diff(time))))
-    count = max(min(round((time[-1] - time[0]) / step), len(time) - _DEGREE - 2), 1)
-    knots = np.linspace(time[0], time[-1], count + 1)
-    knots = _supported(knots, time)
-    ends = np.full(_DEGREE, time[0]), np.full(_DEGREE, time[-1])
-    spline = make_lsq_spline(time, positions, np.concatenate([ends[0], knots, ends[1]]), k=_DEGREE)
-    q, qd, qdd = (np.asarray(spline(knots, nu=k)) for k in range(3))
+    """The motion of positions (N, n) at time (N,) [s], smoothed at `bandwidth` [Hz]: a spline by
+    least squares, with two knots per period of the bandwidth and several rows per knot.
+    """
+    period = float(np.median(np.diff(time)))
+    step = max(0.5 / bandwidth, _ROWS_PER_KNOT * period)
+    wanted = round((time[-1] - time[0]) / step)
+    count = max(min(wanted, len(time) - _DEGREE - 2), 1)
+    knots = _supported(np.linspace(time[0], time[-1], count + 1), time)
+    before = np.full(_DEGREE, time[0])
+    after = np.full(_DEGREE, time[-1])
+    all_knots = np.concatenate([before, knots, after])
+    spline = make_lsq_spline(time, positions, all_knots, k=_DEGREE)
+    q = np.asarray(spline(knots, nu=0))
+    qd = np.asarray(spline(knots, nu=1))
+    qdd = np.asarray(spline(knots, nu=2))
     for end in (0, -1):
         if np.abs(qd[end]).max() < _AT_REST:
             qd[end] = 0.0
@@ -162,17 +169,20 @@ def _worth(
     joules: Joules,
     bandwidth: float,
 ) -> MeasuredMotion:
-    """The smoothed motion, and the experiment that says what its energy is worth."""
+    """The smoothed motion of positions (N, n) at time (N,) [s], and the experiment that says what
+    its energy [J] is worth: smoothed again, as it is and with noise like the measured one, it says
+    how much smoothing loses and how much noise adds.
+    """
     motion = smoothed(names, time, positions, bandwidth)
     seen = motion.sample(np.clip(time, motion.times[0], motion.duration)).q
     noise = _noise(time, positions, seen)
     draw = np.random.default_rng(0)
     once = joules(motion)
     again = joules(smoothed(names, time, seen, bandwidth))
-    noisy = [
-        joules(smoothed(names, time, seen + draw.normal(size=seen.shape) * noise, bandwidth))
-        for _ in range(_REPEATS)
-    ]
+    noisy = []
+    for _ in range(_REPEATS):
+        with_noise = seen + draw.normal(size=seen.shape) * noise
+        noisy.append(joules(smoothed(names, time, with_noise, bandwidth)))
     added = max(float(np.mean(noisy)) - again, 0.0)
     period = float(np.median(np.diff(time)))
     share = _LEAST + (_COARSE_SHARE if period > _COARSE else 0.0)

@@ -211,31 +211,50 @@ def _followed(q: FloatArray, nexts: Sequence[FloatArray]) -> FloatArray:
 
 
 def _judged(points: FloatArray, count: int, station: Station, scene: PlanningScene) -> AccessLine:
-    """A line (L, n): contacts count where the tcp is in the zone, and never at the outer end."""
+    """A line (L, n): contacts count where the tcp is in the zone, and never at the outer end.
+
+    count: points of a whole line; one that has fewer ends where the arm doesn't follow any more.
+    """
     distance = scene.collision.distances(points)
     tcp = scene.chain.tcp_poses(points)[:, :3, 3]
     out = np.linalg.norm(tcp - tcp[0], axis=1)
     whole = len(points) == count
     kept = scene.thresholds(DEFAULT_SAFETY_DISTANCE, station.name)
-    last = np.arange(len(points)) == (count - 1 if count > 1 else -1)
-    plain = last | ~tcp_inside(points, scene, station.name, DEFAULT_SAFETY_DISTANCE)
+    outer_end = count - 1 if count > 1 else -1
+    last = np.arange(len(points)) == outer_end
+    in_zone = tcp_inside(points, scene, station.name, DEFAULT_SAFETY_DISTANCE)
+    plain = last | ~in_zone
     violated = distance <= np.where(plain[:, None], DEFAULT_SAFETY_DISTANCE, kept)
     pairs = np.flatnonzero(violated.any(axis=0))
     found = []
     for z in pairs:
-        k = int(np.flatnonzero(violated[:, z])[np.argmin(distance[violated[:, z], z])])
-        a = scene.collision.pairs[z].body_a
-        b = scene.collision.pairs[z].body_b
-        found.append(Near(a, b, float(distance[k, z]), float(out[k])))
+        rows = np.flatnonzero(violated[:, z])
+        nearest = int(rows[np.argmin(distance[rows, z])])
+        pair = scene.collision.pairs[z]
+        found.append(
+            Near(pair.body_a, pair.body_b, float(distance[nearest, z]), float(out[nearest]))
+        )
+
+    # contacts that a station may allow: of the hand, without penetration, not at the outer end
     least = distance.min(axis=0, initial=np.inf)
     at_end = (distance[last] <= DEFAULT_SAFETY_DISTANCE).any(axis=0)
-    mendable = whole and all(
-        least[z] > 0.0 and not at_end[z] and _is_of_the_hand(int(z), scene) for z in pairs
+    mendable = whole
+    contacts = []
+    for z in pairs:
+        touches = least[z] > 0.0 and not at_end[z]
+        mendable = mendable and bool(touches and _is_of_the_hand(int(z), scene))
+        if least[z] <= kept[z]:
+            contacts.append(_contact(int(z), float(least[z]), scene))
+    near_any = (distance <= DEFAULT_SAFETY_DISTANCE).any(axis=1)
+    return AccessLine(
+        q=points[0],
+        reach=float(out[-1]),
+        whole=whole,
+        near=tuple(sorted(found, key=lambda each: each.distance)),
+        mendable=mendable,
+        contacts=tuple(contacts),
+        within=tcp[near_any & ~last],
     )
-    contacts = tuple(_contact(int(z), float(least[z]), scene) for z in pairs if least[z] <= kept[z])
-    within = tcp[(distance <= DEFAULT_SAFETY_DISTANCE).any(axis=1) & ~last]
-    near = tuple(sorted(found, key=lambda each: each.distance))
-    return AccessLine(points[0], float(out[-1]), whole, near, mendable, contacts, within)
 
 
 def _is_of_the_hand(z: int, scene: PlanningScene) -> bool:

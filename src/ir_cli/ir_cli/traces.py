@@ -212,15 +212,17 @@ def _bridged(source: str, times: FloatArray, positions: FloatArray) -> tuple[str
 
 def _is_bridged(times: FloatArray, positions: FloatArray, k: int) -> bool:
     """Whether the speeds before and after rows k, k + 1 explain the way between them."""
-    gap = times[k + 1] - times[k]
-    before = int(np.searchsorted(times, times[k] - _NEAR))
-    after = int(np.searchsorted(times, times[k + 1] + _NEAR, side="right")) - 1
+    begin = times[k]
+    end = times[k + 1]
+    gap = end - begin
+    before = int(np.searchsorted(times, begin - _NEAR))
+    after = int(np.searchsorted(times, end + _NEAR, side="right")) - 1
     if gap > _NEAR or before == k or after == k + 1:
         return False
-    arriving = (positions[k] - positions[before]) / (times[k] - times[before])
-    leaving = (positions[after] - positions[k + 1]) / (times[after] - times[k + 1])
+    arriving = (positions[k] - positions[before]) / (begin - times[before])
+    leaving = (positions[after] - positions[k + 1]) / (times[after] - end)
     # speeds in the middles of their spans, carried on to the middle of the gap
-    spans = 0.5 * np.array([times[k] - times[before] + gap, times[after] - times[k + 1] + gap])
+    spans = 0.5 * np.array([begin - times[before] + gap, times[after] - end + gap])
     speed = (arriving * spans[1] + leaving * spans[0]) / spans.sum()
     way = positions[k + 1] - positions[k]
     return bool(np.abs(way - speed * gap).max() <= _SAME_PLACE)

@@ -313,6 +313,7 @@ class _Script:
         self._tool = _quarter_turned(pose_of(value.values[:3], turn), 1.0)
 
     def _set_payload(self, call: ast.Call, place: SourcePlace) -> None:
+        """The load that the robot carries from here on: mass [kg], centre [m], moments [kg m^2]."""
         given = self._given(call, ("m", "cog", "inertia"), place)
         if "m" not in given:
             raise KrlRunError("a payload needs its mass", place)
@@ -322,10 +323,12 @@ class _Script:
             raise KrlRunError("cog and inertia are lists of numbers", place)
         if len(centre) != 3 or len(moments) != 6 or any(moments[3:]):
             raise KrlRunError("cog has 3 numbers, inertia 6, of which products must be 0", place)
-        x, y, z = (float(one) for one in _quarter_turned(np.array(centre), 1.0))
-        turned = (90.0, 0.0, 0.0)
+        # from a UR's flange to KUKA's
+        x, y, z = _quarter_turned(np.array(centre), 1.0)
         about = (float(moments[0]), float(moments[1]), float(moments[2]))
-        self._payload = Payload(self._number(given["m"], place), (x, y, z), turned, about)
+        mass = self._number(given["m"], place)
+        turned = (90.0, 0.0, 0.0)
+        self._payload = Payload(mass, (float(x), float(y), float(z)), turned, about)
 
     def _sleep(self, call: ast.Call, place: SourcePlace) -> None:
         seconds = self._number(call.args[0], place) if call.args else 0.0

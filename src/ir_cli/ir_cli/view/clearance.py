@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -43,28 +43,39 @@ def station_accesses(cell: Cell, first: Collection[str] = ()) -> Iterator[Statio
 
 
 def _judged(visit: StationVisit) -> StationAccess:
+    """How near a station comes to anything: in the cheapest free configuration, else in the one
+    that lacks least; without any, the sentence says why.
+    """
     station = visit.station
     scene = visit.scene
     threshold = scene.thresholds(DEFAULT_SAFETY_DISTANCE, station.name)
     found = free_configurations(station.pose, scene, threshold, scene.cell.machine_home)
     free = len(found.q)
     q = found.q
+    sentence = ""
     if not free:
         q = scene.inverse_kinematics.solve(np.asarray(station.pose)[None]).q
-    sentence = "" if free else no_configuration(station.pose, scene, found, station.name).message
+        sentence = no_configuration(station.pose, scene, found, station.name).message
+    access = StationAccess(
+        station=station.name,
+        load=scene.load_text,
+        reached=0,
+        free=0,
+        clearance=None,
+        q=None,
+        pair=(),
+        sentence=sentence,
+    )
     if not len(q):
-        return StationAccess(station.name, scene.load_text, 0, 0, None, None, (), sentence)
+        return access
+    access = replace(access, reached=found.reached, free=free)
     near = scene.collision.min_distance(q, threshold)
     if not len(scene.collision.pairs):
-        return StationAccess(
-            station.name, scene.load_text, found.reached, free, None, q[0], (), sentence
-        )
+        return replace(access, q=q[0])
     k = 0 if free else int(np.argmax(near.distance - threshold[near.pair]))
     pair = scene.collision.pairs[int(near.pair[k])]
-    names = (pair.body_a, pair.body_b)
-    clearance = float(near.distance[k])
-    return StationAccess(
-        station.name, scene.load_text, found.reached, free, clearance, q[k], names, sentence
+    return replace(
+        access, clearance=float(near.distance[k]), q=q[k], pair=(pair.body_a, pair.body_b)
     )
 
 

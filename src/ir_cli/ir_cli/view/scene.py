@@ -36,13 +36,22 @@ def reach_lines(cell: Cell) -> FloatArray:
 
 @lru_cache(maxsize=4)
 def _reach_lines(robot: RobotModel, tcp: tuple[float, ...]) -> FloatArray:
+    """Ends (L, 2, 3) [m] of lines around all that the tcp reaches in random postures: the outline
+    of its half plane through axis 1, turned about this axis, and a ring where it is widest.
+
+    tcp: pose (4, 4) in the last link's frame, row by row.
+    """
     q = np.random.default_rng(0).uniform(
         robot.position_min, robot.position_max, (POSTURES, robot.n)
     )
     tool = np.array(tcp).reshape(4, 4)
-    places = Chain(robot, np.eye(4), tool).tcp_poses(q)[:, :3, 3] - robot.joint_origin[0][:3, 3]
+    axis_place = robot.joint_origin[0][:3, 3]
+    places = Chain(robot, np.eye(4), tool).tcp_poses(q)[:, :3, 3] - axis_place
     radius = np.hypot(places[:, 0], places[:, 1])
-    both = np.concatenate([np.stack([s * radius, places[:, 2]], axis=1) for s in (1.0, -1.0)])
+    height = places[:, 2]
+    ahead = np.stack([radius, height], axis=1)
+    behind = np.stack([-radius, height], axis=1)
+    both = np.concatenate([ahead, behind])
     outline = both[ConvexHull(both).vertices]
     closed = np.concatenate([outline, outline[:1]])
     lines = []
@@ -50,13 +59,13 @@ def _reach_lines(robot: RobotModel, tcp: tuple[float, ...]) -> FloatArray:
         direction = np.array([np.cos(angle), np.sin(angle), 0.0])
         points = closed[:, :1] * direction + closed[:, 1:] * np.array([0.0, 0.0, 1.0])
         lines.append(np.stack([points[:-1], points[1:]], axis=1))
-    widest = outline[int(np.argmax(outline[:, 0]))]
+    widest_radius, widest_height = outline[int(np.argmax(outline[:, 0]))]
     turn = np.linspace(0.0, 2.0 * np.pi, _RING + 1)
-    ring = np.stack(
-        [widest[0] * np.cos(turn), widest[0] * np.sin(turn), np.full(_RING + 1, widest[1])], 1
-    )
+    x = widest_radius * np.cos(turn)
+    y = widest_radius * np.sin(turn)
+    ring = np.stack([x, y, np.full(_RING + 1, widest_height)], axis=1)
     lines.append(np.stack([ring[:-1], ring[1:]], axis=1))
-    return np.concatenate(lines) + robot.joint_origin[0][:3, 3]
+    return np.concatenate(lines) + axis_place
 
 
 # The content of the page's /scene.
