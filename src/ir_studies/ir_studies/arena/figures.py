@@ -120,23 +120,31 @@ def best_costs(runs: Iterable[ArenaRun], name: str = "cost_j") -> dict[Question,
 
 
 def figures(planner: str, runs: Sequence[ArenaRun]) -> Figures:
-    """The figures of a planner among runs of all of them."""
-    J = best_costs(runs)
-    W = best_costs(runs, "movement_cost")
+    """The figures of a planner among runs of all of them: medians over what it solved; costs as
+    ratios to the best of all planners.
+    """
+    best_joules = best_costs(runs)
+    best_movement = best_costs(runs, "movement_cost")
     own = [run for run in runs if run.entry.planner == planner]
     solved = [run for run in own if run.solved]
+    cost_ratios = []
+    movement_ratios = []
+    for run in solved:
+        question = run.entry.question
+        cost_ratios.append(_over(run.number("cost_j"), best_joules[question]))
+        movement_ratios.append(_over(run.number("movement_cost"), best_movement[question]))
     return Figures(
-        planner,
-        len(solved),
-        len(own),
-        _median(run.number("first_s") for run in solved),
-        _median(run.number("final_s") for run in solved),
-        _median(_over(run.number("cost_j"), J[run.entry.question]) for run in solved),
-        _median(run.number("duration_s") for run in solved),
-        _median(run.number("energy_j") for run in solved),
-        _median(_over(run.number("movement_cost"), W[run.entry.question]) for run in solved),
-        min((run.number("clearance_m") for run in solved), default=math.nan),
-        sum(run.row.get("outcome", "answered") != "answered" for run in own),
+        planner=planner,
+        solved=len(solved),
+        count=len(own),
+        first=_median(run.number("first_s") for run in solved),
+        final=_median(run.number("final_s") for run in solved),
+        cost_ratio=_median(cost_ratios),
+        duration=_median(run.number("duration_s") for run in solved),
+        energy=_median(run.number("energy_j") for run in solved),
+        movement_ratio=_median(movement_ratios),
+        clearance=min((run.number("clearance_m") for run in solved), default=math.nan),
+        lost=sum(run.row.get("outcome", "answered") != "answered" for run in own),
     )
 
 

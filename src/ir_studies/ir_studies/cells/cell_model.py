@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from ir_planner.cycle import LinearProgram
@@ -114,73 +114,83 @@ class CellModel:
     # Bounds on each clock.
 
     def _clock(self, robot: InstanceRobot) -> _Clock:
+        """The earliest and latest starts and ends of a robot's stops and hops [s], from the least
+        that comes before and after each.
+        """
         cycle = self.instance.cycle
         closing = robot.closing.number
         stays = {stop.number: stop.least for stop in robot.stops}
-        quickest = {hop.number: min(m.curve.least for m in hop.movements) for hop in robot.hops}
-        clock = _Clock(robot)
+        quickest = {}
+        entering = {stop.number: math.inf for stop in robot.stops}  # the quickest hop to each
+        for hop in robot.hops:
+            seconds = min(movement.curve.least for movement in hop.movements)
+            quickest[hop.number] = seconds
+            entering[hop.end] = min(entering[hop.end], seconds)
         must = _before(robot)
         first = _distances(robot, stays, quickest, forward=True)
         last = _distances(robot, stays, quickest, forward=False)
-        entering = {
-            stop.number: min(
-                (quickest[hop.number] for hop in robot.hops if hop.end == stop.number),
-                default=math.inf,
-            )
-            for stop in robot.stops
-        }
+        clock = _Clock(robot)
         for stop in robot.stops:
-            v = stop.number
-            before = sum(stays[w] + entering[w] for w in must if v in must[w]) + entering[v]
-            after = sum(stays[w] + entering[w] for w in must[v])
-            low = max(first[v], before)
-            rest = 0.0 if v == closing else max(last[v], after)
-            high = cycle - stays[v] - rest
-            clock.begins[v] = (low, high)
-            clock.ends[v] = (low + stays[v], high + stays[v])
+            number = stop.number
+            earlier = [other for other in must if number in must[other]]
+            before = sum(stays[other] + entering[other] for other in earlier) + entering[number]
+            after = sum(stays[other] + entering[other] for other in must[number])
+            low = max(first[number], before)
+            rest = 0.0 if number == closing else max(last[number], after)
+            high = cycle - stays[number] - rest
+            clock.begins[number] = (low, high)
+            clock.ends[number] = (low + stays[number], high + stays[number])
         for hop in robot.hops:
-            low = 0.0 if hop.start == closing else clock.ends[hop.start][0]
-            high = 0.0 if hop.start == closing else clock.begins[hop.end][1] - quickest[hop.number]
+            least = quickest[hop.number]
+            latest_end = clock.begins[hop.end][1]
+            low = 0.0
+            high = 0.0
+            if hop.start != closing:
+                low = clock.ends[hop.start][0]
+                high = latest_end - least
             clock.begins[hop.number] = (low, high)
-            clock.ends[hop.number] = (low + quickest[hop.number], clock.begins[hop.end][1])
+            clock.ends[hop.number] = (low + least, latest_end)
         return clock
 
     # One robot.
 
     def _choices(self, clock: _Clock) -> None:
-        """Which movement each hop takes, and how long it lasts."""
-        p = self.program
+        """Which movement each hop takes, where and in which mode each stop stays, and how long
+        they last: a binary variable for each, and durations between their least and their most.
+        """
+        program = self.program
         for hop in clock.robot.hops:
-            room = clock.ends[hop.number][1] - clock.begins[hop.number][0]
+            available = clock.ends[hop.number][1] - clock.begins[hop.number][0]
             took: Terms = {}
             for movement in hop.movements:
-                most = min(movement.curve.most, room + _SLACK)
+                most = min(movement.curve.most, available + _SLACK)
                 if most < movement.curve.least:
                     continue
-                on = p.binary()
-                corners = [
-                    _Corner(p.variable(cost=energy), duration, energy)
-                    for duration, energy in _first_corners(movement.curve, most)
-                ]
-                row = p.row({on: -1.0} | {c.weight: 1.0 for c in corners}, low=0.0, high=0.0)
-                took |= {c.weight: c.duration for c in corners}
+                on = program.binary()
+                corners = []
+                for duration, energy in _first_corners(movement.curve, most):
+                    weight = program.variable(cost=energy)
+                    corners.append(_Corner(weight, duration, energy))
+                weights = {corner.weight: 1.0 for corner in corners}
+                row = program.row({on: -1.0} | weights, low=0.0, high=0.0)
+                took |= {corner.weight: corner.duration for corner in corners}
                 moving = _Moving(hop, movement, on, most, row, corners)
                 self.moving.append(moving)
                 self._moves_of.setdefault(hop.number, []).append(moving)
             self._lasts(hop.number, took)
         for stop in clock.robot.stops:
-            room = self.instance.cycle if stop.closes else clock.ends[stop.number][1]
+            latest = self.instance.cycle if stop.closes else clock.ends[stop.number][1]
             took = {}
             for place in stop.places:
-                for each in stay_ranges(stop, place, clock.robot.modes):
-                    most = min(each.most, room - clock.begins[stop.number][0] + _SLACK)
-                    if most < each.least:
+                for stay in stay_ranges(stop, place, clock.robot.modes):
+                    most = min(stay.most, latest - clock.begins[stop.number][0] + _SLACK)
+                    if most < stay.least:
                         continue
-                    on = p.binary(cost=each.power * each.least)
-                    longer = p.variable(cost=each.power)
-                    p.row({longer: 1.0, on: each.least - most}, high=0.0)
-                    took |= {on: each.least, longer: 1.0}
-                    staying = _Staying(stop, place.number, each, on)
+                    on = program.binary(cost=stay.power * stay.least)
+                    longer = program.variable(cost=stay.power)
+                    program.row({longer: 1.0, on: stay.least - most}, high=0.0)
+                    took |= {on: stay.least, longer: 1.0}
+                    staying = _Staying(stop, place.number, stay, on)
                     self.staying.append(staying)
                     self._stays_of.setdefault(stop.number, []).append(staying)
             self._lasts(stop.number, took)
@@ -192,35 +202,43 @@ class CellModel:
         self._duration_row[activity] = self.program.row(took | {duration: -1.0}, low=0.0, high=0.0)
 
     def _flows(self, clock: _Clock) -> None:
-        p = self.program
+        """Rows that make the chosen movements and stays one way of the robot through its stops: as
+        many movements enter and leave each place as stays there are, and each stop has one stay.
+        """
+        program = self.program
         cycle = self.instance.cycle
         closing = clock.robot.closing.number
         for stop in clock.robot.stops:
-            clock.start[stop.number] = p.variable(*clock.begins[stop.number])
+            clock.start[stop.number] = program.variable(*clock.begins[stop.number])
         for hop in clock.robot.hops:
             if hop.start == closing:
                 continue
             low, high = clock.begins[hop.number]
-            leave = p.variable(0.0, max(high, 0.0))
+            leave = program.variable(0.0, max(high, 0.0))
             clock.leave[hop.number] = leave
             on = self._on(hop.number)
-            p.row({leave: 1.0} | dict.fromkeys(on, -low), low=0.0)
-            p.row({leave: 1.0} | dict.fromkeys(on, -high), high=0.0)
+            program.row({leave: 1.0} | dict.fromkeys(on, -low), low=0.0)
+            program.row({leave: 1.0} | dict.fromkeys(on, -high), high=0.0)
         for stop in clock.robot.stops:
-            v = stop.number
+            number = stop.number
+            stays = self._stays_of.get(number, ())
             for place in stop.places:
-                here = {s.on: -1.0 for s in self._stays_of.get(v, ()) if s.place == place.number}
+                here = {stay.on: -1.0 for stay in stays if stay.place == place.number}
                 for end in ("start", "end"):
-                    hops = {
-                        m.on: 1.0
-                        for hop in clock.robot.hops
-                        if getattr(hop, end) == v
-                        for m in self._moves_of.get(hop.number, ())
-                        if getattr(m.movement, end) == place.point
-                    }
-                    p.row(hops | here, low=0.0, high=0.0)
-            p.row({s.on: 1.0 for s in self._stays_of.get(v, ())}, low=1.0, high=1.0)
-            self._in_time(clock, stop, -cycle if v == closing else 0.0)
+                    movements = self._movements_at(clock, number, place.point, end)
+                    program.row(dict.fromkeys(movements, 1.0) | here, low=0.0, high=0.0)
+            program.row({stay.on: 1.0 for stay in stays}, low=1.0, high=1.0)
+            self._in_time(clock, stop, -cycle if number == closing else 0.0)
+
+    def _movements_at(self, clock: _Clock, stop: int, point: int, end: str) -> list[int]:
+        """Variables of the movements that start or end (`end`) at a point of a stop."""
+        found: list[int] = []
+        for hop in clock.robot.hops:
+            if getattr(hop, end) != stop:
+                continue
+            moves = self._moves_of.get(hop.number, ())
+            found += [each.on for each in moves if getattr(each.movement, end) == point]
+        return found
 
     def _in_time(self, clock: _Clock, stop: StaticActivity, rest: float) -> None:
         """Movements end when a stop begins, and begin when it ends."""
@@ -291,11 +309,15 @@ class CellModel:
                     )
 
     def _distances_of_phases(self, bindings: list[tuple[_Event, TimeLag]]) -> list[list[bool]]:
-        """The largest differences of phases, and which robots lags connect at all."""
+        """The largest differences of phases [s], and which robots lags connect at all: over chains
+        of robots too, as shortest paths between all of them.
+        """
         cycle = self.instance.cycle
-        count = len(self._clocks)
-        apart = [[0.0 if i == j else math.inf for j in range(count)] for i in range(count)]
-        linked = [[False] * count for _ in range(count)]
+        robots = range(len(self._clocks))
+        apart = [[math.inf for _ in robots] for _ in robots]
+        linked = [[False for _ in robots] for _ in robots]
+        for i in robots:
+            apart[i][i] = 0.0
         for event, lag in bindings:
             i = self.instance.robot_of[lag.earlier]
             j = self.instance.robot_of[lag.later]
@@ -306,9 +328,9 @@ class CellModel:
             # phase_i - phase_j <= late_j - early_i - length + height * cycle
             most = self._clocks[j].begins[lag.later][1] - self._times(event)[0]
             apart[j][i] = min(apart[j][i], most - lag.length + lag.height * cycle)
-        for k, i, j in itertools.product(range(count), repeat=3):
-            apart[i][j] = min(apart[i][j], apart[i][k] + apart[k][j])
-            linked[i][j] = linked[i][j] or (linked[i][k] and linked[k][j])
+        for over, i, j in itertools.product(robots, repeat=3):
+            apart[i][j] = min(apart[i][j], apart[i][over] + apart[over][j])
+            linked[i][j] = linked[i][j] or (linked[i][over] and linked[over][j])
         self._apart = apart
         return linked
 
@@ -398,28 +420,27 @@ class CellModel:
 
     def _separate(self, a: int, b: int, modes: set[tuple[int, int]]) -> None:
         """Where both choices are taken: end of a <= start of b + k cycles, and end of that b <=
-        start of the next a.
+        start of the next a; k is a variable of the program.
         """
         cycle = self.instance.cycle
-        first = self._interval(a)
-        second = self._interval(b)
-        # start b - end a in [low, high]; start a - end b in [low_2, high_2]
-        i = self.instance.robot_of[a]
-        j = self.instance.robot_of[b]
-        phases = (
-            max(self._clocks[j].phase_low - self._clocks[i].phase_high, -self._apart[j][i]),
-            min(self._clocks[j].phase_high - self._clocks[i].phase_low, self._apart[i][j]),
-        )
-        start_a = self._clocks[i].begins[a]
-        end_a = self._clocks[i].ends[a]
-        start_b = self._clocks[j].begins[b]
-        end_b = self._clocks[j].ends[b]
-        end_a = (end_a[0], cycle) if self._closes(a) else end_a
-        end_b = (end_b[0], cycle) if self._closes(b) else end_b
-        later = (phases[0] + start_b[0] - end_a[1], phases[1] + start_b[1] - end_a[0])
-        earlier = (start_a[0] - end_b[1] - phases[1], start_a[1] - end_b[0] - phases[0])
-        low = math.ceil((-later[1] - _SLACK) / cycle)
-        high = math.floor((earlier[1] + cycle + _SLACK) / cycle)
+        robot_a = self.instance.robot_of[a]
+        robot_b = self.instance.robot_of[b]
+        clock_a = self._clocks[robot_a]
+        clock_b = self._clocks[robot_b]
+
+        # how much later the clock of b may begin than that of a
+        phase_low = max(clock_b.phase_low - clock_a.phase_high, -self._apart[robot_b][robot_a])
+        phase_high = min(clock_b.phase_high - clock_a.phase_low, self._apart[robot_a][robot_b])
+        _, start_a_high = clock_a.begins[a]
+        _, start_b_high = clock_b.begins[b]
+        end_a_low, _ = clock_a.ends[a]
+        end_b_low, _ = clock_b.ends[b]
+
+        # start b - end a is at most `later`, start a - end b at most `earlier`: that bounds k
+        later = phase_high + start_b_high - end_a_low
+        earlier = start_a_high - end_b_low - phase_low
+        low = math.ceil((-later - _SLACK) / cycle)
+        high = math.floor((earlier + cycle + _SLACK) / cycle)
         sides = self._rows_of_conflict(a, b, modes)
         if low > high:
             for one, others in sides:
@@ -428,12 +449,15 @@ class CellModel:
         k = self.program.variable(low, high, whole=True)
         self.separations[a, b] = k
         spare = self._longest(a) + self._longest(b)
-        start_to_end = _sum(_sum(second[0], first[1], -1.0), {k: cycle}, 1.0)
-        end_to_start = _sum(_sum(first[0], second[1], -1.0), {k: -cycle}, 1.0)
+        start_a, end_a, early_a, early_end_a = self._interval(a)
+        start_b, end_b, early_b, early_end_b = self._interval(b)
+        start_to_end = _sum(_sum(start_b, end_a, -1.0), {k: cycle}, 1.0)
+        end_to_start = _sum(_sum(start_a, end_b, -1.0), {k: -cycle}, 1.0)
         for one, others in sides:
             on = dict.fromkeys([*one, *others], spare)
-            self.program.row(_sum(start_to_end, on, -1.0), low=-2.0 * spare + first[3] - second[2])
-            low_2 = -cycle - 2.0 * spare + second[3] - first[2]
+            low_1 = -2.0 * spare + early_end_a - early_b
+            low_2 = -cycle - 2.0 * spare + early_end_b - early_a
+            self.program.row(_sum(start_to_end, on, -1.0), low=low_1)
             self.program.row(_sum(end_to_start, on, -1.0), low=low_2)
 
     def _longest(self, activity: int) -> float:
@@ -441,26 +465,30 @@ class CellModel:
             return max((s.range.most for s in self._stays_of.get(activity, ())), default=0.0)
         return max((m.most for m in self._moves_of.get(activity, ())), default=0.0)
 
-    def _closes(self, activity: int) -> bool:
-        return activity in self._stops and self._stops[activity].closes
-
     def _rows_of_conflict(
         self, a: int, b: int, modes: set[tuple[int, int]]
     ) -> list[tuple[list[int], list[int]]]:
-        """Choices that exclude each other, as few rows as one side needs."""
+        """Choices of a and of b that exclude each other, as few rows as one side needs: variables
+        of the one side, and all of the other that any of them excludes.
+        """
         by_first: dict[int, set[int]] = {}
         by_second: dict[int, set[int]] = {}
-        for g, h in modes:
-            by_first.setdefault(g, set()).add(h)
-            by_second.setdefault(h, set()).add(g)
-        rows = []
+        for first, second in modes:
+            by_first.setdefault(first, set()).add(second)
+            by_second.setdefault(second, set()).add(first)
+        pairs: list[tuple[set[int], set[int]]]
         if len(by_first) <= len(by_second):
-            pairs: Iterable[tuple[set[int], set[int]]] = [({g}, hs) for g, hs in by_first.items()]
+            pairs = [({first}, seconds) for first, seconds in by_first.items()]
         else:
-            pairs = [(gs, {h}) for h, gs in by_second.items()]
-        for gs, hs in pairs:
-            one = [k for g in sorted(gs) for k in self._chosen(a, g)]
-            others = [k for h in sorted(hs) for k in self._chosen(b, h)]
+            pairs = [(firsts, {second}) for second, firsts in by_second.items()]
+        rows = []
+        for firsts, seconds in pairs:
+            one: list[int] = []
+            for first in sorted(firsts):
+                one += self._chosen(a, first)
+            others: list[int] = []
+            for second in sorted(seconds):
+                others += self._chosen(b, second)
             if one and others:
                 rows.append((one, others))
         return rows
@@ -630,18 +658,27 @@ def _first_corners(curve: EnergyCurve, most: float) -> list[tuple[float, float]]
     ratio = (most / low) ** (1.0 / (_FIRST_TANGENTS - 1))
     points = {low * ratio**k for k in range(_FIRST_TANGENTS - 1)} | {most}
     points.add(min(max(curve.cheapest(), low), most))
+
+    # tangents with slopes that differ: others would meet nowhere, or far away
     lines: list[tuple[float, float]] = []
     for duration in sorted(points):
-        line = curve.tangent(duration)
-        if not lines or line[0] - lines[-1][0] > _SAME * max(abs(line[0]), abs(lines[-1][0])):
-            lines.append(line)
+        slope, zero = curve.tangent(duration)
+        if lines:
+            flatter = lines[-1][0]
+            if slope - flatter <= _SAME * max(abs(slope), abs(flatter)):
+                continue
+        lines.append((slope, zero))
     durations = [low]
     for (slope, zero), (steeper, zero_2) in itertools.pairwise(lines):
         crossing = (zero - zero_2) / (steeper - slope)
         durations.append(min(max(crossing, durations[-1]), most))
     if most > low:
         durations.append(most)
-    return [(t, max(slope * t + zero for slope, zero in lines)) for t in durations]
+    corners = []
+    for duration in durations:
+        energy = max(slope * duration + zero for slope, zero in lines)
+        corners.append((duration, energy))
+    return corners
 
 
 def _sum(terms: Mapping[int, float], more: Mapping[int, float], factor: float) -> Terms:

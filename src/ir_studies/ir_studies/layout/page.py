@@ -139,9 +139,11 @@ class PlanView:
         close: bool = False,
     ) -> None:
         was = list(outlines(given))
-        moved = [one for one in (outlines(best) if best is not None else ()) if _is_new(one, was)]
-        self._outlines = [*(("was", one) for one in was), *(("best", one) for one in moved)]
-        around = _CLOSE_M if close else max(_AROUND * float(np.ptp(places, axis=0).max()), _LEAST_M)
+        self._outlines = [("was", one) for one in was]
+        if best is not None:
+            self._outlines += [("best", one) for one in outlines(best) if _is_new(one, was)]
+        extent = float(np.ptp(places, axis=0).max())
+        around = _CLOSE_M if close else max(_AROUND * extent, _LEAST_M)
         low = places.min(axis=0) - around
         high = places.max(axis=0) + around
         for _, points in self._outlines:  # what stands at these places is seen as a whole
@@ -149,10 +151,12 @@ class PlanView:
             if inside.all(axis=1).mean() > _MOSTLY:
                 low = np.minimum(low, points.min(axis=0))
                 high = np.maximum(high, points.max(axis=0))
-        more = np.maximum((np.zeros(2) if size is None else size) - (high - low), 0.0)
+        wanted = np.zeros(2) if size is None else size
+        more = np.maximum(wanted - (high - low), 0.0)
         self._low = low - 0.5 * more
         self.size = high - low + more
-        self.across, up = (float(one) for one in self.size)
+        self.across = float(self.size[0])
+        up = float(self.size[1])
         self._scale = (WIDTH - 2 * _MARGIN) / max(self.across, up / _TALLEST)
         self._height = self._scale * up + 2 * _MARGIN
 
@@ -166,29 +170,33 @@ class PlanView:
         """SVG with marks: place (2,), kind (dot, open, cross, given, best), colour, words; moves:
         arrows between places, with their words; names: of what stands at a place (2,).
         """
-        shapes = [
-            f'<polygon class="{kind}" '
-            f'points="{" ".join(f"{x:.1f},{y:.1f}" for x, y in self._at(points))}"/>'
-            for kind, points in self._outlines
-        ]
-        shapes += [mark(*self._at(place[None])[0], *rest) for place, *rest in marks]
+        shapes = []
+        for kind, points in self._outlines:
+            corners = " ".join(f"{x:.1f},{y:.1f}" for x, y in self._at(points))
+            shapes.append(f'<polygon class="{kind}" points="{corners}"/>')
+        for place, kind, fill, words in marks:
+            x, y = self._at(place[None])[0]
+            shapes.append(mark(x, y, kind, fill, words))
         boxes = []
         for words, place in names.items():
             x, y = self._at(place[None])[0]
             boxes.append(box_of(words, x - 0.5 * _LETTER * len(words), y + 4.0))
             shapes.append(f'<text class="stands" x="{x:.1f}" y="{y + 4:.1f}">{text(words)}</text>')
-        corners = [self._at(points) for _, points in self._outlines]
-        tips = [self._at(np.stack([start, end])) for start, end, _ in moves]
-        shapes += [arrow(*line) for line in tips]
-        boxes += [(*line.min(axis=0), *line.max(axis=0)) for line in tips]
-        for line, (*_, words) in zip(tips, moves, strict=True):
-            x, y = place_of_words(words, list(line), corners, boxes, self._height)
+
+        # words of arrows keep off outlines, names and other arrows
+        drawn_outlines = [self._at(points) for _, points in self._outlines]
+        arrows = [self._at(np.stack([start, end])) for start, end, _ in moves]
+        for start, end in arrows:
+            shapes.append(arrow(start, end))
+        boxes += [(*line.min(axis=0), *line.max(axis=0)) for line in arrows]
+        for line, (_, _, words) in zip(arrows, moves, strict=True):
+            x, y = place_of_words(words, list(line), drawn_outlines, boxes, self._height)
             boxes.append(box_of(words, x, y))
             shapes.append(f'<text class="move" x="{x:.1f}" y="{y:.1f}">{text(words)}</text>')
         shapes.append(self._measure())
-        kind = "plan whole" if moves else "plan"
+        plan = "plan whole" if moves else "plan"
         return (
-            f'<svg class="{kind}" viewBox="0 0 {WIDTH:g} {self._height:.0f}" role="img" '
+            f'<svg class="{plan}" viewBox="0 0 {WIDTH:g} {self._height:.0f}" role="img" '
             f'aria-label="{text(name)}">{"".join(shapes)}</svg>'
         )
 
@@ -695,23 +703,27 @@ def _maps(
     _, best = ends(finals)
     star = settings.placing.cell(cell, best[0].placement.values) if best else None
     limits = shown_range(known)
-    costs = dict(zip(map(id, known), estimates(known), strict=True))
-    owners = [v.owner for v in settings.variables if v.part in ("x", "y") and v.owner != "tool"]
+    with_costs = list(zip(known, estimates(known), strict=True))
+    with_costs.sort(key=lambda each: _drawn_last(each[0], each[1]))
+    on_floor = [each for each in settings.variables if each.part in ("x", "y")]
+    owners = [variable.owner for variable in on_floor if variable.owner != "tool"]
     drawings: list[tuple[str, list[Mark]]] = []
     for owner in dict.fromkeys(owners):
         at = place_of(owner, cell)
         marks: list[Mark] = []
-        for one in sorted(known, key=lambda one: _drawn_last(one, costs[id(one)])):
+        for one, cost in with_costs:
             shift = [one.placement.values.get(f"{owner}.{axis}", 0.0) for axis in "xy"]
-            marks.append((at + shift, *_mark_of(one, costs[id(one)], limits)))
+            marks.append((at + shift, *_mark_of(one, cost, limits)))
         marks.append((at, "given", "", "as given"))
         if star is not None:
             marks.append((place_of(owner, star), "best", "", "best"))
         drawings.append((owner.removeprefix(_MACHINE), marks))
+
+    # all views have the size of the largest: they are compared
     places = [np.array([place for place, *_ in marks]) for _, marks in drawings]
-    sizes = [PlanView(cell, star, each).size for each in places]
-    for (name, marks), each in zip(drawings, places, strict=True):
-        view = PlanView(cell, star, each, np.max(sizes, axis=0))
+    sizes = [PlanView(cell, star, own_places).size for own_places in places]
+    for (name, marks), own_places in zip(drawings, places, strict=True):
+        view = PlanView(cell, star, own_places, np.max(sizes, axis=0))
         title = f"{name}, {view.across:.1f} m from edge to edge"
         yield f"<div><h3>{text(title)}</h3>{view.drawn(f'Where {name} stands', marks)}</div>"
 
@@ -794,30 +806,35 @@ def _charts(
 
 
 def _chart(variable: Variable, known: Sequence[Known], low: float, high: float) -> str:
-    """Cost over one variable; what is dearer than shown stands at the upper edge."""
+    """Cost over one variable, as SVG; what is dearer than shown stands at the upper edge. low,
+    high: costs [J] at both ends of the axis.
+    """
     width = max(variable.high - variable.low, 1e-9)
+    bottom = _HIGH - _BELOW
     marks = []
     for one in sorted(known, key=lambda one: _drawn_last(one, one.cost)):
         value = one.placement.values.get(variable.name, 0.0)
         if not math.isfinite(one.cost):
             continue
+        share = min((one.cost - low) / (high - low), 1.0)
         x = _LEFT + (_CHART - _LEFT - 10.0) * (value - variable.low) / width
-        y = 10.0 + (_HIGH - _BELOW - 10.0) * (1.0 - min((one.cost - low) / (high - low), 1.0))
-        given = one.placement.key == GIVEN.key
+        y = 10.0 + (_HIGH - _BELOW - 10.0) * (1.0 - share)
+        kind = "given" if one.placement.key == GIVEN.key else "dot"
         words = f"{variable.name} {value:g} {variable.unit}: {kilowatt_hours(one.cost)}"
-        marks.append(mark(x, y, "given" if given else "dot", colour(one.cost, low, high), words))
+        marks.append(mark(x, y, kind, colour(one.cost, low, high), words))
+    numbers = []
     ends_of = ((_LEFT, "start", variable.low), (_CHART - 10.0, "end", variable.high))
-    numbers = [
-        f'<text x="{x:g}" y="{_HIGH - 10:g}" text-anchor="{anchor}">{value:g} '
-        f"{variable.unit}</text>"
-        for x, anchor, value in ends_of
-    ]
-    decimals = max(0, 1 - math.floor(math.log10(max(high - low, 1e-6) / 3600.0)))
-    numbers += [
-        f'<text x="{_LEFT - 6:g}" y="{y:g}" text-anchor="end">{value / 3600.0:.{decimals}f}</text>'
-        for y, value in ((16.0, high), (_HIGH - _BELOW, low))
-    ]
-    line = f'<path class="grid" d="M{_LEFT:g} 8V{_HIGH - _BELOW + 4:g}H{_CHART - 6:g}"/>'
+    for x, anchor, value in ends_of:
+        numbers.append(
+            f'<text x="{x:g}" y="{_HIGH - 10:g}" text-anchor="{anchor}">{value:g} '
+            f"{variable.unit}</text>"
+        )
+    span_wh = max(high - low, 1e-6) / 3600.0
+    decimals = max(0, 1 - math.floor(math.log10(span_wh)))
+    for y, value in ((16.0, high), (bottom, low)):
+        shown_wh = f"{value / 3600.0:.{decimals}f}"
+        numbers.append(f'<text x="{_LEFT - 6:g}" y="{y:g}" text-anchor="end">{shown_wh}</text>')
+    line = f'<path class="grid" d="M{_LEFT:g} 8V{bottom + 4:g}H{_CHART - 6:g}"/>'
     return (
         f"<figure><figcaption>{text(variable.name)} (Wh)</figcaption>"
         f'<svg class="over" viewBox="0 0 {_CHART:g} {_HIGH:g}" role="img" '

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, product
 from typing import TypeAlias
 
 import numpy as np
@@ -50,18 +50,22 @@ class _Plane:
 
 
 def overlaps(cell: Cell) -> Overlaps:
-    """What reaches into each other: bodies of different machines in any of their states (a door
-    that opens needs its place too), bodies and the floor, the robot's base and what it stands on.
+    """What reaches into each other, and how deep [m]: bodies of different machines in any of their
+    states (a door that opens needs its place too), bodies and the floor, the robot's base and what
+    it stands on.
     """
     machines = [[_shape(body) for body in _bodies(each)] for each in cell.equipment]
     bodies = [body for own in machines for body in own]
     floor = [_Plane("floor", np.eye(4))] if cell.floor else []
-    base = list(_base(cell))
-    pairs = [(a, b) for own, other in combinations(machines, 2) for a in own for b in other]
-    pairs += [(body, plane) for body in bodies for plane in floor]
-    stands = set(cell.ignored_pairs)
-    pairs += [(a, b) for a in base for b in (*bodies, *floor) if (a.name, b.name) in stands]
-    depths = {(a.name, b.name): _depth(a, b) for a, b in pairs}
+    pairs: list[tuple[_Solid | _Plane, _Solid | _Plane]] = []
+    for own, other in combinations(machines, 2):
+        pairs += product(own, other)
+    pairs += product(bodies, floor)
+    stands_on = set(cell.ignored_pairs)
+    for base, body in product(_base(cell), [*bodies, *floor]):
+        if (base.name, body.name) in stands_on:
+            pairs.append((base, body))
+    depths = {(one.name, other.name): _depth(one, other) for one, other in pairs}
     return {pair: depth for pair, depth in depths.items() if depth > 0.0}
 
 
