@@ -83,41 +83,41 @@ class Uncertainty:
         """Torques (N, n, P) [Nm] more for one standard deviation of each of P independent
         parameters, where `torque` is expected; all (N, n).
         """
+        n = self._plain.n
+        coupling = self.model.coupling
         plain = self._plain.inverse_dynamics(q, qd, qdd)
         links = [link.inverse_dynamics(q, qd, qdd) - plain for link in self._links]
-        coupling = self.model.coupling
         rotors = self.model.reflected_inertia * coupling.motors(qdd)
         scaled = self._scaled.inverse_dynamics(q, qd, qdd) - plain
         balance = coupling.motor_torque(self._plain.counterbalance(q))
         qd = coupling.motors(qd)
         sign = np.tanh(qd / _SIGN)
-        n = self._plain.n
-        rest = (
-            self.model.friction_coulomb
-            * STRIBECK_SHARE
-            * np.exp(-np.abs(qd) / STRIBECK_SPEED)
-            * sign
-        )
-        axes = (qd, sign, np.abs(torque) * sign)
-        known = [_on_axis(values, j) for values in axes for j in range(n)]
-        either_way = STANDING_SHARE * self.model.friction_coulomb
+
+        # known with their covariance: viscous, Coulomb and gear friction of each axis, and masses
+        known = []
+        for values in (qd, sign, np.abs(torque) * sign):
+            known += [_on_axis(values, j) for j in range(n)]
+        known += [rotors, scaled, -balance]
+        of_known = np.stack(known, axis=2) @ self._root
+
+        # Stribeck friction of each axis
+        falls = np.exp(-np.abs(qd) / STRIBECK_SPEED)
+        rest = self.model.friction_coulomb * STRIBECK_SHARE * falls * sign
+        stribeck = np.stack([_on_axis(rest, j) for j in range(n)], axis=2)
+
+        # friction of an axis that stands may point anywhere; of one that creeps, its sign is unsure
         standing = self.standing(qd)
         moving = np.sign(qd) * (1.0 - standing)
-        creeping = [np.tanh(qd / speed) - moving for speed in _CREEPS]
-        unknown = [standing, *(each / np.sqrt(len(_CREEPS)) for each in creeping)]
-        known += [rotors, scaled, -balance]
-        return np.concatenate(
-            (
-                np.stack(known, axis=2) @ self._root,
-                np.stack(links, axis=2),
-                np.stack([_on_axis(rest, j) for j in range(n)], axis=2),
-                np.stack(
-                    [_on_axis(either_way * values, j) for values in unknown for j in range(n)],
-                    axis=2,
-                ),
-            ),
-            axis=2,
-        )
+        shapes = [standing]
+        for speed in _CREEPS:
+            creeping = np.tanh(qd / speed) - moving
+            shapes.append(creeping / np.sqrt(len(_CREEPS)))
+        either_way = STANDING_SHARE * self.model.friction_coulomb
+        unknown = []
+        for shape in shapes:
+            unknown += [_on_axis(either_way * shape, j) for j in range(n)]
+        parts = (of_known, np.stack(links, axis=2), stribeck, np.stack(unknown, axis=2))
+        return np.concatenate(parts, axis=2)
 
     def standing(self, qd: FloatArray) -> FloatArray:
         """Share (N, n) of the Coulomb friction that may act either way, because the motor hardly

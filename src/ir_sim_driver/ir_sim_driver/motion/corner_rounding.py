@@ -145,17 +145,19 @@ def _mean(trajectory: JointTrajectory, window: float, moving: bool) -> JointTraj
     first = int(given[0])
     t = (given - first) / NS_PER_S
     q = trajectory.positions
+    # before it begins: at rest, or on with the speed that it begins with
     start = q[0] - (q[1] - q[0]) / t[1] * window if moving else q[0]
     t = np.concatenate(([-window], t, [t[-1] + window]))
     at = (knots - first) / NS_PER_S
     corners = np.vstack((start, q, q[-1]))
     now = _interpolated(t, corners, at)
-    then = _interpolated(t, corners, at - window)
-    velocities = (now - then) / window
+    window_ago = _interpolated(t, corners, at - window)
+    velocities = (now - window_ago) / window
     velocities[-1] = 0.0
     # q~' is a line between knots: its integral keeps neighbours consistent to the last bit
     steps = np.diff(at)[:, None] * 0.5 * (velocities[1:] + velocities[:-1])
-    mean = 0.5 * (start + q[0]) + np.vstack((np.zeros(q.shape[1]), np.cumsum(steps, axis=0)))
+    travelled = np.vstack((np.zeros(q.shape[1]), np.cumsum(steps, axis=0)))
+    mean = 0.5 * (start + q[0]) + travelled
     mean[-1] = q[-1]
     kept = _kept_knots(knots)
     return JointTrajectory(trajectory.joint_names, knots[kept], mean[kept], velocities[kept])

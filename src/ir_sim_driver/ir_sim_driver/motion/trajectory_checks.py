@@ -249,6 +249,8 @@ def joining(
     begin = _motion_at_point(trajectory, 0)
     if trajectory.times_ns[0] != 0 or np.abs(begin.qd).max() <= AT_REST or s >= path.duration:
         return None
+
+    # the nearest instant of the path ahead, then polished by Newton's method
     until = min(path.duration, s + _AHEAD)
     looks = np.linspace(s, until, 2 + int((until - s) / _LOOKS))
     away = np.abs(path.positions(looks) - begin.q).max(axis=1)
@@ -257,17 +259,19 @@ def joining(
     at = float(looks[int(away.argmin())])
     for _ in range(_POLISHED):
         there = path.motion(at)
-        along = float(np.square(there.qd).sum())
-        at += float(((begin.q - there.q) * there.qd).sum()) / along if along > 0.0 else 0.0
+        squared_speed = float(np.square(there.qd).sum())
+        ahead = float(((begin.q - there.q) * there.qd).sum())
+        at += ahead / squared_speed if squared_speed > 0.0 else 0.0
         at = min(max(at, s), path.duration)
+
     there = path.motion(at)
-    off = [float(np.abs(a - b).max()) for a, b in zip(there, begin, strict=True)]
-    if any(value > most for value, most in zip(off, _JOINED, strict=True)):
-        return None
-    coefficients, durations = path.between(s, at)
-    own, seconds = trajectory.coefficients()
-    whole = _path([coefficients, own], [durations, seconds], path.position(s))
-    return LeadPath(whole, float(durations.sum()), len(durations), joined=True)
+    for own, wanted, most in zip(there, begin, _JOINED, strict=True):
+        if float(np.abs(own - wanted).max()) > most:
+            return None
+    lead, lead_durations = path.between(s, at)
+    coefficients, durations = trajectory.coefficients()
+    whole = _path([lead, coefficients], [lead_durations, durations], path.position(s))
+    return LeadPath(whole, float(lead_durations.sum()), len(lead_durations), joined=True)
 
 
 def route_onto(
@@ -290,21 +294,25 @@ def route_onto(
         return _bridged(trajectory, now, settings.bridge_time, late)
     first = float(trajectory.times[0]) + (max(0.0, delay) if moving else 0.0)
     coefficients, durations = trajectory.coefficients()
+    begin = _motion_at_point(trajectory, 0)
     if first > 0.0:
-        lead = quintic(now, _motion_at_point(trajectory, 0), first)
-        return LeadPath(_path([lead, coefficients], [np.array([first]), durations], now.q), 0.0, 1)
+        lead = quintic(now, begin, first)
+        whole = _path([lead, coefficients], [np.array([first]), durations], now.q)
+        return LeadPath(whole, 0.0, 1)
     _check_start(trajectory, now, acceleration_max, settings)
-    if moving or np.abs(_motion_at_point(trajectory, 0).qd).max() > AT_REST:
+    if moving or np.abs(begin.qd).max() > AT_REST:
         return _bridged(trajectory, now, settings.bridge_time)
-    delta = np.abs(trajectory.positions[0] - now.q)
+    start = trajectory.positions[0]
+    delta = np.abs(start - now.q)
     if delta.max() <= _SAME:
-        return LeadPath(Path(coefficients, durations, trajectory.positions[0]), 0.0, 0)
+        return LeadPath(Path(coefficients, durations, start), 0.0, 0)
+
+    # from rest to rest, as long as the share of the acceleration takes
     T = math.sqrt(_PEAK * float((delta / acceleration_max).max()) / share)
     still = np.zeros_like(delta)
-    closing = quintic(
-        PathMotion(now.q, still, still), PathMotion(trajectory.positions[0], still, still), T
-    )
-    return LeadPath(_path([closing, coefficients], [np.array([T]), durations], now.q), T, 1)
+    closing = quintic(PathMotion(now.q, still, still), PathMotion(start, still, still), T)
+    whole = _path([closing, coefficients], [np.array([T]), durations], now.q)
+    return LeadPath(whole, T, 1)
 
 
 def _bridged(

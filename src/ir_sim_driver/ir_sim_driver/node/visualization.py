@@ -39,13 +39,13 @@ class RobotMarkers:
         axes = np.array([capsule.p1 - capsule.p0 for capsule in capsules]).reshape(-1, 3)
         lengths = np.linalg.norm(axes, axis=1)
         turns = [turn_z_to(*axis) for axis in zip(axes, lengths.tolist(), strict=True)]
+        ends = [(capsule.p0, capsule.p1) for capsule in capsules]
         self._links = [capsule.link for capsule in capsules]
-        self._ends = np.array([(c.p0, c.p1) for c in capsules]).reshape(-1, 2, 3)
+        self._ends = np.array(ends).reshape(-1, 2, 3)
         self._turns = rotations_from_quaternions(np.array(turns)) if turns else None
-        parts = [("robot", robot), ("load", load)]
-        self._pairs = [
-            _pair(name, k, capsule) for name, part in parts for k, capsule in enumerate(part)
-        ]
+        self._pairs = [_pair("robot", k, capsule) for k, capsule in enumerate(robot)]
+        self._pairs += [_pair("load", k, capsule) for k, capsule in enumerate(load)]
+        # markers of an earlier load with more capsules would stay
         self.loads = max(len(load), loads)
         gone = range(2 * len(load), 2 * self.loads)
         deleted = [Marker(ns="load", id=k, action=Marker.DELETE) for k in gone]

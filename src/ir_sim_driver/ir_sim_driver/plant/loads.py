@@ -55,12 +55,15 @@ class LoadDiagram:
             return ""
         com = sum((load.mass * load.com for load in loads), np.zeros(3)) / mass
         off_axis = com - (com @ self._axis) * self._axis
-        distances = np.linalg.norm(com - self._centre), np.linalg.norm(off_axis)
-        about_centre = sum((_about(load, self._centre) for load in loads), np.zeros((3, 3)))
-        about_flange = sum((_about(load, np.zeros(3)) for load in loads), np.zeros((3, 3)))
+        about_centre = np.zeros((3, 3))
+        about_flange = np.zeros((3, 3))
+        for load in loads:
+            about_centre = about_centre + _about(load, self._centre)
+            about_flange = about_flange + _about(load, np.zeros(3))
+        arms = np.linalg.norm(com - self._centre), np.linalg.norm(off_axis)
         inertias = np.linalg.eigvalsh(about_centre)[-1], self._axis @ about_flange @ self._axis
         for k, where in enumerate(("the wrist's centre", "the last axis")):
-            moment = mass * _GRAVITY * float(distances[k])
+            moment = mass * _GRAVITY * float(arms[k])
             if not moment <= self._moments[k]:
                 bound = f"the robot carries at most {self._moments[k]:.4g} Nm"
                 return f"{text} has a moment of {moment:.4g} Nm about {where}: {bound}"

@@ -569,6 +569,8 @@ class PyBulletBackend:
     def _accelerations(self, outer: Sequence[float]) -> list[float]:
         """qdd (n,) of a step in which this torque (n,) acts on the joints, and friction at the
         speed in its middle; solved for the motors, to which rotors and friction belong.
+
+        Newton's method: friction counts as linear about the speed of the last iteration.
         """
         gears = self._gears
         lagging = self._of_motors(self._lagging)
@@ -583,9 +585,8 @@ class PyBulletBackend:
         own = [row[j] + rotor for j, row, rotor in zip(self._axes, rows, self._rotor, strict=True)]
         dry = gears.dry(speed, self._load)
         friction, slope = gears.friction(speed, dry)
-        for k in range(
-            _ITERATIONS
-        ):  # the state's speed lags half a step: qd is the speed at its position
+        # the state's speed lags half a step: qd is the speed at its position
+        for k in range(_ITERATIONS):
             self._diagonal[:] = [m + half * s for m, s in zip(own, slope, strict=True)]
             rest = zip(outer, friction, slope, speed, lagging, strict=True)
             left = [t - f + s * (v - w) for t, f, s, v, w in rest]
@@ -595,7 +596,8 @@ class PyBulletBackend:
             linear = zip(friction, slope, speed, before, strict=True)
             expected = [f + s * (v - u) for f, s, v, u in linear]
             friction, slope = gears.friction(speed, dry, chord=k >= _NEWTON)
-            if max(map(abs, map(sub, friction, expected))) < _FRICTION:
+            missed = max(map(abs, map(sub, friction, expected)))
+            if missed < _FRICTION:
                 break
         gears.heat(friction, speed)
         if self._coupling.coupled:
