@@ -148,6 +148,9 @@ def run_compare(arguments: argparse.Namespace) -> int:
 
 
 def _found(arguments: argparse.Namespace, planner: Planner, line: ProgressLine) -> BeforeAfter:
+    """The comparison that the arguments ask for: today's stations, trace or KRL program against a
+    plan of the same.
+    """
     options = options_of(arguments)
     process = _process(arguments.process)
     endings = {KRL[0] if is_project(path) else path.suffix.lower() for path in arguments.today}

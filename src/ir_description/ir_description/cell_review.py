@@ -171,6 +171,9 @@ def _from_shoulder(point: FloatArray, shoulder: FloatArray, cell: Cell) -> float
 
 
 def _stations(cell: Cell) -> Iterator[CellFinding]:
+    """Stations whose tcp is inside a body or out of reach, or whose machine or contacts have no
+    effect.
+    """
     shoulder = _shoulder(cell)
     reach = _reach(cell)
     machines = {machine.name: machine for machine in cell.equipment}

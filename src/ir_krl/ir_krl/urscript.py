@@ -173,6 +173,9 @@ class _Script:
         return Followed(self._name, tuple(self._commands), worst_first(self._notes))
 
     def _statement(self, text: str, place: SourcePlace) -> None:
+        """Follow one line: the program's name, a variable, or a call. KrlError for control flow,
+        and for calls that may move the robot and aren't read.
+        """
         if match := re.fullmatch(r"def\s+(\w+)\(\):", text):
             self._name = match[1].upper()
             return

@@ -122,6 +122,9 @@ class _Builder:
         return root
 
     def _node(self, event: yaml.Event, depth: int) -> Node:
+        """The node that an event begins, with its line. Tags, anchors and aliases are refused, and
+        more values or a deeper nesting than the limits.
+        """
         line = _line(event)
         self._nodes += 1
         if self._nodes > self._limits.nodes:

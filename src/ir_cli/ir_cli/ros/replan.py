@@ -328,6 +328,9 @@ def planned_again(recorded: RecordedPlanner) -> Iterator[Replanned]:
 
 
 def _again(planner: Planner, call: Call, states: list[tuple[int, bytes]]) -> Replanned:
+    """A recorded call asked again, with its seed and the state at its time: are the ids of the
+    answer the same?
+    """
     if call.response is None:
         return _not_compared(call, "its answer was too long to be recorded")
     if call.response.status.code == StatusCode.PREEMPTED:

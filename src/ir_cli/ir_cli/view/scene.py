@@ -90,6 +90,9 @@ KEPT = ("end", "rests", "lanes", "power", "clearance", "peak")
 
 
 def _packed(cell: Cell, content: Mapping[str, Json]) -> bytes:
+    """The scene for the viewer as JSON, with what it draws of a cell beside a recording's: reach,
+    stations, joint ranges.
+    """
     scene = content["scene"]
     if not isinstance(scene, dict):  # a recording without joint states
         scene = failed_scene(cell)

@@ -216,6 +216,9 @@ class _CellReader:
         self._tool_names: list[str] = []
 
     def cell(self) -> Cell:
+        """The cell of the whole tree. Each check stands behind the last value that it needs, so
+        that a sentence names the line that is at fault.
+        """
         table = self._table
         robot = self._robot
         base_pose = _pose(table.get("base"))

@@ -43,6 +43,9 @@ def cell_to_yaml(cell: Cell) -> str:
 
 
 def _cell(cell: Cell) -> Iterator[str]:
+    """Lines of the whole file, in the order in which people write it; what has its default is left
+    out.
+    """
     yield f"format: {FORMAT}"
     yield f"name: {cell.name}"
     if cell.description:
@@ -194,6 +197,7 @@ def _body(body: Body) -> str:
 
 
 def _station(station: Station) -> Iterator[str]:
+    """Lines of a station; what has its default is left out."""
     yield f"name: {station.name}"
     yield f"pose: {{{_pose(station.pose_in_equipment)}}}"
     yield f"approach_distance: {_number(station.approach_distance)}"

@@ -279,6 +279,9 @@ class _WorldReader:
                 yield WorldMachine(name, each.pose, tuple(bodies))
 
     def urdf(self, root: Xml.Element) -> Iterator[WorldMachine]:
+        """A machine for each link that stands still in the world, with the poses (4, 4) of all
+        joints above it; others are left out with a sentence.
+        """
         above = {}
         for joint in root.findall("joint"):
             parent = joint.find("parent")
@@ -313,6 +316,9 @@ class _WorldReader:
                 yield WorldMachine(_plain(name), pose, tuple(bodies))
 
     def _bodies(self, machine: str, place: Xml.Element, pose: FloatArray) -> list[Body]:
+        """The bodies of one <collision> or <visual> at a pose (4, 4); what is no shape that is read
+        is left out with a sentence.
+        """
         geometry = place.find("geometry")
         shapes = [] if geometry is None else list(geometry)
         shape = shapes[0] if shapes else None

@@ -296,6 +296,7 @@ class RobotModel:
             raise InvalidValueError("envelope_torque must be positive and must not rise with speed")
 
     def _check_names(self, n: int) -> None:
+        """Names of links and capsules fit each other and the n joints."""
         if len(self.link_names) != n + 1:
             raise InvalidValueError(
                 f"{len(self.link_names)} link names for {n} joints, must be {n + 1}"

@@ -414,6 +414,9 @@ class Control:
         self._signals.stood(seconds, place)
 
     def _wait_for(self, tree: SyntaxTree) -> None:
+        """WAIT FOR: nobody sets inputs here, so the wait is taken as fulfilled, and a note says
+        what is assumed of its time.
+        """
         condition = tree.children[0]
         self._check_names(condition)
         for index, value in self._waited(condition, wanted=True):

@@ -270,6 +270,9 @@ def goal_motion_of(request: Any, cell: Cell) -> EndMotion:
 
 
 def _end_motion(msg: Any, acceleration: Sequence[float], what: str, cell: Cell) -> EndMotion:
+    """Velocity [rad/s] and acceleration [rad/s^2] (n,) at an end of a movement in the robot's
+    order, None each where it rests. RequestError where they don't fit.
+    """
     start = what == "start"
     code = StatusCode.START_STATE_INVALID if start else StatusCode.GOAL_STATE_INVALID
     field_name = "start" if start else "goal_state"

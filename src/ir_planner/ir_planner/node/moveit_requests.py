@@ -171,6 +171,9 @@ def goals_of(given: Sequence[Any], cell: Cell) -> list[Any]:
 
 
 def _goal(given: Any, cell: Cell, what: str) -> Any:
+    """A goal of MoveIt as a message of the planner: joint values, or a pose of the tcp.
+    RequestError for constraints that make no goal.
+    """
     joints = len(given.joint_constraints)
     places = len(given.position_constraints)
     turns = len(given.orientation_constraints)

@@ -184,6 +184,7 @@ def _repeats(msg: Any, published: Sequence[MoveItShape], cell: Cell) -> bool:
 def _apply(
     msg: Any, cell: Cell, machines: Collection[str], ours: dict[str, Equipment], notes: list[str]
 ) -> None:
+    """Change our machines by one collision object: removed, moved, extended or made."""
     name = str(msg.id)
     what = f"collision object {shown(name)}"
     operation = msg.operation[0] if isinstance(msg.operation, bytes) else int(msg.operation)

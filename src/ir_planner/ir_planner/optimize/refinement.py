@@ -349,6 +349,9 @@ class Refinement:
             check_requested(self.shortest, self.context)
 
     def _refined(self, solution: Solution, path: FloatArray, effort: Effort) -> Movement | None:
+        """A solution through all further stages, then proved; where the proof names a pair or the
+        tilt, with more margin for it, a few times. None where that doesn't help.
+        """
         for stage in effort.after(solution.stage.level):
             solution = self.staged(
                 solution, decisive(stage, effort.last, self._rounding(solution)), path

@@ -256,6 +256,7 @@ class _Analyser:
         self.link = recorded_link(self.recording, self.data)
 
     def analysis(self) -> Analysis:
+        """All that the recording tells; without power series figures of energy are NaN."""
         recording = self.recording
         power = (
             recording.power

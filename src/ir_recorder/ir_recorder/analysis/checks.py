@@ -313,6 +313,7 @@ def _twice(low: float, high: float) -> tuple[float, float]:
 
 
 def _pause(name: str, result: StepResult, bounds: Tolerances) -> Iterator[Finding]:
+    """Findings of a pause: its duration, and the energy that its modes take."""
     movement = result.step.movement
     if movement.duration <= 0.0:
         return  # a stop without a dwell: nothing is planned

@@ -139,6 +139,9 @@ class CellView:
             self._show()
 
     def _show(self) -> None:
+        """Make the scene anew of the cell and its doors as they stand, without frames: a live view
+        has none.
+        """
         cell = self._cell
         read = self._read_cell
         if cell is None or read is None:

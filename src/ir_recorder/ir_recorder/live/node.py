@@ -106,6 +106,9 @@ class LiveNode(Node):
         super().destroy_node()
 
     def _tick(self) -> None:
+        """Take what has arrived since the last tick, the newest of each topic, and pass it on to
+        the page. Power that is overdue is shown as unknown.
+        """
         for command in self._commands.take():
             self._ask(command)
         values: dict[str, Json] = {}

@@ -215,6 +215,7 @@ class PlayNode(Node):
             )
 
     def _open(self, topic: str, type_name: str, qos: str) -> None:
+        """A publisher as the topic was offered when recorded, if its type is installed."""
         if topic in self._feeds:
             return
         try:

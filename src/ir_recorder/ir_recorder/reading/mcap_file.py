@@ -183,6 +183,7 @@ class _Collector:
         self.complete = False
 
     def add(self, record: McapRecord) -> None:
+        """Keep a record by its kind; count messages of unknown channels and impossible times."""
         if isinstance(record, Message):
             if record.log_time > LATEST:
                 self.timeless += 1
@@ -254,6 +255,9 @@ def read_raw(
 
 
 def _read_file(path: Path, roots: FileRoots, chunks: ChunkReader) -> RawRecording:
+    """The raw channels of a file, with a sentence for what it lacks. ReadError where it is no MCAP
+    file or holds nothing.
+    """
     try:
         with roots.open_to_read(path) as stream:
             found = _collect(stream, chunks)

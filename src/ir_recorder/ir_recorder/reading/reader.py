@@ -162,6 +162,9 @@ class _SeriesReader:
         self._power_series: PowerSeries | None = None
 
     def recording(self) -> Recording:
+        """All series of the raw channels, with a sentence for what can't be read; a recording
+        without a run holds the planned program instead.
+        """
         raw = self._raw
         for channel in raw.channels:
             if channel.message_encoding != "cdr" and channel.messages:

@@ -129,6 +129,9 @@ class MachinesInScene:
         return next((sentence for sentence in sentences if sentence), "")
 
     def _refusal(self, text: str, now: float) -> str:
+        """Why a trajectory that relies on "machine=state" can't begin now; "" where it can. now
+        [s].
+        """
         name, _, wanted = text.partition("=")
         machine = next((each for each in self.cell.equipment if each.name == name), None)
         if machine is None:

@@ -93,6 +93,9 @@ class FrameMaker:
         return Frame(joints, simulation.load, power, following, outputs, finding)
 
     def _power(self, stamp_ns: int) -> PowerState:
+        """The meter's reading; powers [W] are means since the reading before, as differences of
+        energies.
+        """
         simulation = self._simulation
         simulation.mains.settle()
         reading = simulation.mains.meter.reading()

@@ -169,6 +169,9 @@ class SimDriver(Node):
         )
 
     def _open_requests(self) -> None:
+        """Actions and services. Presses of the stop and PLC inputs have participants and threads of
+        their own: they don't wait for other requests.
+        """
         self._actions = [self._serve_action(ExecuteTrajectory, own(names.EXECUTE_TRAJECTORY))]
         follow = control_type("action", "FollowJointTrajectory")
         if follow is not None:

@@ -127,6 +127,9 @@ class _InstanceReader:
         return StaticActivity(number, least, most, tuple(places), closes)
 
     def _hop(self, element: _Element) -> DynamicActivity:
+        """A hop with its movements, all between the same two stops, and their energies as sums of
+        powers.
+        """
         number = self._activity(element)
         movements = []
         ends = set()
@@ -284,6 +287,7 @@ def _decimal(value: float) -> str:
 
 
 def _write_robot(element: _Element, robot: InstanceRobot) -> None:
+    """Add a robot's stops, hops and power modes in the words of the published format."""
     _sub(element, "name", robot.name)
     activities = _sub(element, "activities")
     for stop in robot.stops:

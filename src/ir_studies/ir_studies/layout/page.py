@@ -662,6 +662,7 @@ def _displacements(one: Final) -> dict[str, str]:
 
 
 def _rows(finals: Sequence[Sequence[Final]], costs: Costs) -> Iterator[tuple[str, ...]]:
+    """Cells of the table, a row for each condition of each placement."""
     given, _ = ends(finals)
     rank = 0
     for own in finals:

@@ -202,6 +202,7 @@ class _Reader:
         self._notes: list[str] = []
 
     def tree(self, root: Xml.Element) -> UrdfTree:
+        """The links and joints as a tree: no name twice, and no link carried by two joints."""
         self._notes += _not_read(root)
         elements = root.findall("link")
         if len(elements) > _LINKS_MAX:
@@ -237,6 +238,9 @@ class _Reader:
         return UrdfTree(name, links, above, tuple(self._notes), urdf_transmissions(root))
 
     def _link(self, element: Xml.Element) -> UrdfLink:
+        """A link with its shapes and its inertia (3, 3) [kg m^2] about the centre of mass, in the
+        link's frame. Entries that the file leaves out are 0, with a note.
+        """
         name = _name(element, "link")
         _check_once(element, ("inertial",), f"link {name}")
         shapes = [self._shape(one, name) for one in element.findall("collision")]
@@ -274,6 +278,7 @@ class _Reader:
         return UrdfLink(name, weight, pose[:3, 3], about, tuple(shapes), line)
 
     def _joint(self, element: Xml.Element) -> UrdfJoint:
+        """A joint with its limits; without an axis that of URDF's default, x."""
         name = _name(element, "joint")
         once = ("parent", "child", "origin", "axis", "limit", "mimic")
         _check_once(element, once, f"joint {name}")
