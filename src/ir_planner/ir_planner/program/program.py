@@ -132,8 +132,7 @@ def _withdrawal_log(
     if walk is None:
         return log
     every = max(-(-len(walk.dropped) // _DROPPED), 1)
-    return replace(
-        log,
+    return log._replace(
         generations=walk.generations,
         candidates=walk.candidates,
         distance=walk.distance,
