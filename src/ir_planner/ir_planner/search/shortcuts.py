@@ -128,4 +128,5 @@ def _best_pull(
     free = edges.reshape(2, count).all(axis=0)
     if not free.any():
         return via
-    return trials[int(np.argmin(np.where(free, cost, np.inf)))]
+    cheapest = int(np.argmin(np.where(free, cost, np.inf)))
+    return np.asarray(trials[cheapest])
