@@ -5,6 +5,7 @@ afterwards.
 from __future__ import annotations
 
 import struct
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
@@ -188,6 +189,55 @@ def test_recover_before_the_drives_are_on_resets_the_latch_and_nothing_else(cell
     assert cell.simulation.modes.mode is Mode.BUS_POWER_OFF
     cell.wake_up()
     assert cell.simulation.modes.mode is Mode.STAND_ON_MOTORS
+
+
+@pytest.mark.parametrize("press", PRESSES)
+@pytest.mark.parametrize("mode", [Mode.TO_HIBERNATION, Mode.HIBERNATION, Mode.FROM_HIBERNATION])
+def test_after_a_stop_in_hibernation_the_robot_stays_awake(
+    cell: Cell, mode: Mode, press: Press
+) -> None:
+    """HIB is still 1 when the controller is woken: it is ignored until it has been 0, as always."""
+    cell.bring_into(mode)
+    cell.driver.plc.write_inputs(SERVICE, {"hib": True})
+    press(cell.driver)
+    cell.driver.plc.write_inputs(SERVICE, {"emergency_stop": False})
+    cell.driver.plc.write_inputs(SERVICE, {"hib": True})
+    cell.driver.plc.wake()
+    if mode is Mode.TO_HIBERNATION:
+        cell.until(Mode.HIBERNATION)
+        cell.run(0.1)
+        cell.driver.plc.wake()
+    cell.until(Mode.EMERGENCY_STOP)
+    cell.driver.recover()
+    cell.until(Mode.STAND_ON_MOTORS)
+    cell.run(1.0)
+    assert cell.simulation.modes.mode is Mode.STAND_ON_MOTORS
+
+
+@pytest.mark.parametrize("bit", ["ab", "drives_off"])
+def test_who_takes_its_own_bit_back_is_heard_also_after_a_stop(cell: Cell, bit: str) -> None:
+    """A stop came between the request and its answer, or while the driver was suspended."""
+    cell.run(0.1)
+    cell.driver.press(SERVICE, bit, True, client="runner")
+    cell.run(1.0)
+    asked = time.monotonic_ns()
+    by_service(cell.driver)
+    cell.driver.press(SERVICE, f"end_{bit}", True, came_ns=asked, client="runner")
+    cell.driver.press(SERVICE, "emergency_stop", False)
+    cell.run(0.5)
+    assert cell.simulation.modes.mode is Mode.EMERGENCY_STOP
+    cell.driver.recover()
+    cell.until(Mode.STAND_ON_MOTORS)
+    assert cell.simulation.control.refusal() == ""
+
+
+def test_a_rest_that_its_end_does_not_end_says_why(cell: Cell) -> None:
+    cell.bring_into(Mode.BUS_POWER_OFF)
+    cell.driver.press(SERVICE, "AUT", True)
+    _, remark = cell.driver.press(SERVICE, "end_ab", True)
+    assert "operating mode is AUT, must be EXT" in remark
+    cell.run(0.5)
+    assert cell.simulation.modes.mode is Mode.BUS_POWER_OFF
 
 
 def test_a_press_while_recovering_stops_again(cell: Cell) -> None:

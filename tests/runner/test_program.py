@@ -112,6 +112,8 @@ class World:
                     return Status(StatusCode.TIMED_OUT, "hibernates"), ()
                 self.log.append(f"{name}={int(value)}")
                 self.set_bit(name, value)
+                if self.ignores_bits and value:
+                    return Status.success(f"{name.upper()} counts only in EXT"), ()
             case ask.AskModes():
                 table = tuple(
                     PowerMode(
@@ -337,7 +339,9 @@ def test_a_mode_that_is_not_reached_is_noted_and_the_program_goes_on():
     world = World(ignores_bits=True)
     result = world.run([pause(60.0, "BUS_POWER_OFF"), move()])
     assert result.status.ok
-    assert "BUS_POWER_OFF was not reached within 8.0 s, the mode is STAND_ON_MOTORS" in world.log[5]
+    sentence = "BUS_POWER_OFF was not reached within 8.0 s, the mode is STAND_ON_MOTORS"
+    assert f"{sentence}: AB counts only in EXT" in world.log[5]
+    assert f"{sentence}: AB counts only in EXT" in result.status.message
     assert world.bits["ab"] is False
 
 

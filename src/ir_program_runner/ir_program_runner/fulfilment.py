@@ -187,9 +187,13 @@ class Fulfilment:
             case ask.SetPlcInput(name, value):
                 status = await ports.driver.set_plc_input(name, value)
                 # what counts is the mode that follows, which is waited for
-                return Status.success() if status.code == StatusCode.INPUT_IGNORED else status
+                ignored = status.code == StatusCode.INPUT_IGNORED
+                return Status.success(status.message) if ignored else status
             case ask.TakeBack(name):
-                return await ports.driver.set_plc_input(TAKE_BACK + name, True)
+                status = await ports.driver.set_plc_input(TAKE_BACK + name, True)
+                if status.code == StatusCode.INPUT_IGNORED:  # so the rest does not end
+                    return Status(StatusCode.INVALID_ROBOT_STATE, status.message)
+                return status
             case ask.Drive(trajectory, cell_hash, load, station, states):
                 return await ports.driver.drive(
                     trajectory, self._stop, cell_hash, load, station, states, self._after_stop

@@ -130,12 +130,14 @@ class PauseRun:
         for mode, each in zip(self._modes, times, strict=True):
             yield Phase(f"pause: going to {mode.name}")
             outcome = yield from self._ask_for(mode)
+            ignored = outcome.status.message
             enough = stay + each.enter + self._settings.enter_timeout
             patience = min(enough, max(0.0, wake_at - outcome.now))
             outcome = yield WaitForMode((mode,), patience)
             if outcome.status.code == StatusCode.TIMED_OUT:
                 found = "not known" if outcome.mode is None else outcome.mode.name
                 note = f"{mode.name} was not reached within {patience:.1f} s, the mode is {found}"
+                note += f": {ignored}" if ignored else ""
                 need((yield WaitUntil(wake_at)))
                 return note
             need(outcome)
@@ -146,16 +148,18 @@ class PauseRun:
 
     def _ask_for(self, mode: Mode) -> Requests:
         """Set the bit of a mode, then clear that of the one before: between the two the robot stays
-        where it is. The controller waits for the shortest stay by itself.
+        where it is. The controller waits for the shortest stay by itself. The message of the status
+        says why the bit does not count, "" where it does.
         """
         before = self._mode
         self._mode = mode
-        outcome = need((yield SetPlcInput(_BIT[mode], True)))
+        given = need((yield SetPlcInput(_BIT[mode], True)))
+        outcome = given
         if before in _BIT:
             outcome = need((yield TakeBack(_BIT[before])))
         if before is Mode.STAND_ON_BRAKES:  # takes the latched drives_off back
             outcome = need((yield SetPlcInput(END_REST, True)))
-        return outcome
+        return replace(outcome, status=given.status)
 
     def _wake(self, end: float, times: RestTimes) -> Requests:
         """Wake the robot and wait until it stands on motors; then no bit of the pause is left."""

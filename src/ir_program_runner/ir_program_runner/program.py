@@ -132,6 +132,13 @@ def step_name(index: int, total: int, movement: PlannedMovement) -> str:
     return f"step {index + 1} of {total} ({text})"
 
 
+def _first_of(notes: Sequence[str]) -> str:
+    """What the end of a program says of steps that did not go as planned, "" where all did."""
+    if len(notes) < 2:
+        return "".join(notes)
+    return f"{notes[0]}; {len(notes)} steps have notes, see ~/program_state"
+
+
 def _check_gap(where: str, before: PlannedMovement, movement: PlannedMovement) -> None:
     assert before.trajectory is not None
     assert movement.trajectory is not None
@@ -192,6 +199,7 @@ class Program:
             return ProgramResult(failure.status, 0)
         except CanceledError:
             return ProgramResult(Status(StatusCode.PREEMPTED, "canceled before the first step"), 0)
+        notes: list[str] = []
         for index, movement in enumerate(self._movements):
             where = step_name(index, total, movement)
             try:
@@ -205,7 +213,9 @@ class Program:
                 yield Announce(index, Event.CANCELED, str(canceled))
                 return ProgramResult(Status(StatusCode.PREEMPTED, f"canceled in {where}"), index)
             yield Announce(index, Event.ENDED, note)
-        return ProgramResult(Status.success(), total)
+            if note:
+                notes.append(f"{where}: {note}")
+        return ProgramResult(Status.success(_first_of(notes)), total)
 
     def _start(self) -> Steps:
         """Begin only with a robot that is awake; clear the pause bits, so that a later 1 counts."""

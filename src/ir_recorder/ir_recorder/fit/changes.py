@@ -732,11 +732,12 @@ def _stretches(usual: Opened, rows: IntArray) -> tuple[IntArray, BoolArray]:
     these (S,) is a movement.
     """
     speeds = [by_window(run.prepared.speed) for run in usual.estimate.runs]
-    moving = (np.abs(np.concatenate(speeds)) > MOVING).any(axis=1)[usual.estimate.window[rows]]
+    moves = np.any(np.abs(np.concatenate(speeds)) > MOVING, axis=1)
+    moving = np.asarray(moves)[usual.estimate.window[rows]]
     stretch = np.cumsum(np.diff(moving, prepend=moving[:1]) != 0)
-    moves = np.zeros(int(stretch[-1]) + 1, bool)
-    moves[stretch] = moving
-    return stretch, moves
+    is_movement = np.zeros(int(stretch[-1]) + 1, bool)
+    is_movement[stretch] = moving
+    return stretch, is_movement
 
 
 # What is named: what makes the whole much likelier, and the rows of its smaller part as well.

@@ -336,7 +336,8 @@ class Driver:
 
         Returns the levels and a remark: why the bit will not count. A pressed emergency stop is
         latched in every mode, asleep too, and has been acted upon when this returns. came_ns: as of
-        `recover`; only a press may come before the last stop. client: who it is among a writer's.
+        `recover`; only a press, and what takes one's own bit back, may come before the last stop.
+        client: who it is among a writer's.
         after_stop: the last stop that it knows, 0 where it doesn't say; another one refuses all but
         a press.
         """
@@ -344,19 +345,22 @@ class Driver:
         with self._access.online(asleep_too=pressed) as simulation:
             plc = simulation.plc
             if not pressed:
-                plc.stop.refuse_earlier(came_ns, name)
+                if name not in _TAKEN_BACK:  # which moves nothing, and nobody asks for again
+                    plc.stop.refuse_earlier(came_ns, name)
                 if after_stop not in (0, simulation.stop_number):
                     refusal = stale(after_stop, simulation.stop_number)
                     raise RequestRefusedError(StatusCode.INVALID_ROBOT_STATE, refusal)
             if name == END_REST or name in _TAKEN_BACK:
-                if level:
-                    plc.check_owner(writer)
-                    giver = giver_of(writer, client)
-                    if name == END_REST:
-                        simulation.control.end_rest(giver)
-                    else:
-                        simulation.control.take_back(_TAKEN_BACK[name], giver)
-                return plc.raw, ""
+                if not level:
+                    return plc.raw, ""
+                plc.check_owner(writer)
+                giver = giver_of(writer, client)
+                if name == END_REST:
+                    simulation.control.end_rest(giver)
+                    return plc.raw, ""
+                bit = _TAKEN_BACK[name]
+                simulation.control.take_back(bit, giver)
+                return plc.raw, plc.remark(bit, simulation.pauses.rest is not None)
             try:
                 plc.raw.with_bit(name, level)
             except IrError as error:
