@@ -1,4 +1,4 @@
-"""The cell of a route with several parts in flight, and the program of one cycle in it.
+"""The cell of a route with several parts in flight, and the steps of one transport in it.
 
 Every part of a route is like the one that the file names. What lies elsewhere is a copy of it, with
 capsules, bodies and allowed contacts of its own names.

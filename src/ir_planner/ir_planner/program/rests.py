@@ -165,6 +165,10 @@ class Rests:
     def known(self, pause: float) -> tuple[float, Steps]:
         """Least energy [J] of a pause of known length [s], ready at its end, and the sequence; no
         steps: on motors, as the controller spends it by itself.
+
+        Of sequences that cost the same the shallower one. For a PROFIenergy pause the controller
+        chooses by itself (`best_route` of ir_sim_driver, which knows no timer): the planner may not
+        import the driver.
         """
         best = (self.cost((), pause)[0], Steps())
         for rests in self.sequences:

@@ -12,10 +12,11 @@ points and given trajectories, which have their configurations, begin at `search
     plan_to_goal                         a configuration, or all free ones at a pose
     └── plan_to_configurations           the ends within limits; the answer as a MovementPlan
         └── search_regional              bound of the tilt, ends in motion, the torque reserve
+            ├── _paths_between           blocked ends, then the first free paths
+            │   └── _free_paths          in brief, a proof that there are none, at length
+            │       └── first_paths                  exploration: one search after another
             └── _by_timing               synchronous first, then each joint with a law of its own
-                └── _synchronous         blocked ends, the free paths, the refusal
-                    ├── _free_paths      the first free paths, or a proof that there are none
-                    │   └── first_paths              exploration: one search after another
+                └── _synchronous         what the paths lead to, over free steps for cost W
                     └── _first_that_is_certified     optimised, along a segment, in straight steps
                         └── best_found               companions: the own run, and those beside it
                             └── improve              exploration: one run, turn by turn
@@ -144,6 +145,28 @@ def refusal(
 
 # paths that get straight steps with blended corners: the cheapest by W is rarely not best
 _TIMED = 3
+
+
+def plan_to_goal(
+    start: FloatArray, goal: Goal, context: Context, searches: Searches
+) -> MovementPlan:
+    """Movement from start (n,) to a configuration, or to any free one at a pose. Raises
+    RequestError.
+    """
+    if goal.configuration is not None:
+        return plan_to_configurations(start, goal.configuration[None], context, searches)
+    assert goal.pose is not None  # a Goal has one of both
+    scene = context.scene
+    if scene.chain.first_slides and goal.rail is None:
+        solutions = configurations_over(goal.pose, start, context)
+    else:
+        solutions = free_configurations(goal.pose, scene, context.thresholds(), start, goal.rail)
+    if len(solutions.q) == 0:
+        status = no_configuration(goal.pose, context.scene, solutions, goal.text or "goal")
+        return MovementPlan(
+            status, context.journal.info(start, context.joint_names), TrajectoryReport()
+        )
+    return plan_to_configurations(start, solutions.q, context, searches)
 
 
 def plan_to_configurations(
@@ -319,25 +342,3 @@ def _in_straight_steps(
 def _straightened(path: FloatArray, space: FreeSpace) -> FloatArray:
     weights = space.scene.weights
     return pulled(fewest_corners(path, space, weights), space, weights) if len(path) > 2 else path
-
-
-def plan_to_goal(
-    start: FloatArray, goal: Goal, context: Context, searches: Searches
-) -> MovementPlan:
-    """Movement from start (n,) to a configuration, or to any free one at a pose. Raises
-    RequestError.
-    """
-    if goal.configuration is not None:
-        return plan_to_configurations(start, goal.configuration[None], context, searches)
-    assert goal.pose is not None  # a Goal has one of both
-    scene = context.scene
-    if scene.chain.first_slides and goal.rail is None:
-        solutions = configurations_over(goal.pose, start, context)
-    else:
-        solutions = free_configurations(goal.pose, scene, context.thresholds(), start, goal.rail)
-    if len(solutions.q) == 0:
-        status = no_configuration(goal.pose, context.scene, solutions, goal.text or "goal")
-        return MovementPlan(
-            status, context.journal.info(start, context.joint_names), TrajectoryReport()
-        )
-    return plan_to_configurations(start, solutions.q, context, searches)

@@ -91,7 +91,8 @@ def best_route(
     must be but for the last; empty: stay in `source`, which draws source_watts, on motors or in a
     rest.
 
-    A mode is entered at the power of the one before.
+    A mode is entered at the power of the one before. Of routes that cost the same the shallower
+    one, as in the planner's choice for pauses of a program (`Rests.known` of ir_planner).
     """
     motors = table[0].power
     deeper = [

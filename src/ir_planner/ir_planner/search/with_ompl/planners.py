@@ -53,9 +53,9 @@ def found_by(
     if outcome.path is None:
         return Found([], outcome.error or f"OMPL found no path in {outcome.edges} checks")
     path = repaired(_path_with_ends(outcome.path, ends), space, seed)
-    return Found(
-        [path] if path is not None else [], "OMPL's path is blocked and could not be repaired"
-    )
+    if path is None:
+        return Found([], "OMPL's path is blocked and could not be repaired")
+    return Found([path])
 
 
 def _path_with_ends(path: FloatArray, ends: Ends) -> FloatArray:
