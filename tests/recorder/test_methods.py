@@ -84,11 +84,11 @@ def test_a_drawing_has_a_mark_for_everything_that_was_kept_dropped_or_tried(
     ("log", "said"),
     [
         (
-            replace(WITHDRAWAL, blocked="line out of washer_rinse: a too near b"),
+            WITHDRAWAL._replace(blocked="line out of washer_rinse: a too near b"),
             "not free (a too near b); 3",
         ),
         (
-            replace(WITHDRAWAL, asked=True),
+            WITHDRAWAL._replace(asked=True),
             "asks for it, though the straight line back along the tool is free",
         ),
         (WITHDRAWAL, "by eq. (7): 3 generations"),
@@ -98,7 +98,7 @@ def test_a_drawing_has_a_mark_for_everything_that_was_kept_dropped_or_tried(
 def test_a_withdrawal_says_why_it_is_not_the_straight_line(
     log: WithdrawalLog, said: str, generations: int, analysis: Analysis
 ) -> None:
-    words = section(analysis, replace(log, generations=generations))
+    words = section(analysis, log._replace(generations=generations))
     assert said in words or generations == 0
     assert ("two trees" in words) is (generations == 0)
     assert ("is free" in words) is log.asked
@@ -158,7 +158,7 @@ def test_figures_that_are_left_out_are_counted(analysis: Analysis) -> None:
 def test_what_was_the_same_at_several_visits_is_said_once_with_their_number(
     analysis: Analysis,
 ) -> None:
-    other = replace(WITHDRAWAL, load="gripper", candidates=90)
+    other = WITHDRAWAL._replace(load="gripper", candidates=90)
     html = section(analysis, WITHDRAWAL, other, WITHDRAWAL, CORRECTION, WITHDRAWAL, CORRECTION)
     first, second, third = re.findall(r"<figcaption>(.*?)</figcaption>", html)
     assert html.count("<svg") == 3
@@ -173,7 +173,7 @@ def test_a_recording_without_logs_has_no_such_section(analysis: Analysis) -> Non
 
 def test_logs_of_another_cell_are_said_in_words_and_texts_are_escaped(analysis: Analysis) -> None:
     html = section(
-        analysis, replace(WITHDRAWAL, station="<script>"), replace(CORRECTION, goal="a&b")
+        analysis, WITHDRAWAL._replace(station="<script>"), replace(CORRECTION, goal="a&b")
     )
     assert "<script>" not in html
     assert "&lt;script&gt;" in html
