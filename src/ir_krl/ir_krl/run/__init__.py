@@ -17,9 +17,9 @@ from ir_krl.run.commands import (
     TimeBlock,
     WaitForCondition,
 )
-from ir_krl.run.memory import SignalRange
 from ir_krl.run.notes import Effect, Note, worst_first
 from ir_krl.run.program import Followed, UnknownRoutine, follow
+from ir_krl.run.signals import SignalRange
 from ir_krl.run.values import FRAME_NAMES, RAIL_NAME
 
 __all__ = [

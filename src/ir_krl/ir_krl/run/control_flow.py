@@ -18,19 +18,9 @@ from ir_krl.run.commands import (
     WaitForCondition,
 )
 from ir_krl.run.expressions import Expressions, same
-from ir_krl.run.memory import (
-    CYCLIC,
-    FLAG,
-    INPUT,
-    TIMER,
-    TIMER_FLAG,
-    Memory,
-    Signals,
-    Step,
-    Watched,
-    module_of,
-)
+from ir_krl.run.memory import Memory, Step, Watched, module_of
 from ir_krl.run.notes import Effect, Note
+from ir_krl.run.signals import CYCLIC, FLAG, INPUT, TIMER, TIMER_FLAG, Signals
 from ir_krl.run.values import Unknown, Value, integer
 
 STATEMENTS_MAX = 200_000

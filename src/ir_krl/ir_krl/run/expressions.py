@@ -9,7 +9,8 @@ from typing import Any
 
 from ir_krl.errors import KrlRunError, SourcePlace
 from ir_krl.language import SyntaxTree, place_of
-from ir_krl.run.memory import SINGLE, TIMER, Memory, Signals, Step
+from ir_krl.run.memory import Memory, Step
+from ir_krl.run.signals import SINGLE, TIMER, Signals
 from ir_krl.run.system import STOPS_ADVANCE
 from ir_krl.run.values import (
     FRAME_NAMES,

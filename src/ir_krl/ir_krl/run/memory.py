@@ -1,9 +1,13 @@
-"""Memory of a running program: variables, inputs, outputs and timers."""
+"""Variables of a running program, as they stand: of the routine that runs, of its module, of all.
+
+A module is a .src with its .dat. A variable of a data list is known in its module, one that is
+GLOBAL or stands in $CONFIG everywhere; where two have the same name the nearest one counts.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import PurePath
 from typing import Any
 
@@ -19,18 +23,10 @@ from ir_krl.run.values import (
     Value,
     copied,
     in_range,
-    integer,
-    number,
     real,
     rounded,
     typed,
 )
-
-# Variables by name, as they stand while a program runs: of the routine that runs, of its module,
-# of all.
-#
-# A module is a .src with its .dat. A variable of a data list is known in its module, one that is
-# GLOBAL or stands in $CONFIG everywhere; where two have the same name the nearest one counts.
 
 
 def module_of(file: str) -> str:
@@ -58,31 +54,41 @@ Noted = Callable[[SourcePlace, str, Effect], None]
 
 @dataclass
 class Memory:
-    """`shared` holds what is known everywhere, `modules` the data lists by the names of their
-    modules, `scopes` the calls that run. module: whose statements run; listed: all names that data
-    lists declare; types: components of structures; assumed: values that the program didn't bring,
-    by name or name[index]; chosen: the same of system variables that a function has just found;
-    noted: hears of those that are used; guesses: how many were; watched: see `watch`. settings:
-    what a user has set, which variables of a call begin with too; beside: what triggers have set
-    since the advance run stopped last; ahead: it is ahead of a motion since then. delivered: what
-    is said of figures of $config.dat that were used as controllers are delivered, and where first.
+    """All variables, what the program didn't bring, and what the advance run has to know of them.
+
+    Where variables are, the nearest first:
+    scopes: the calls that run; module: whose statements run; modules: data lists by the names of
+    their modules; listed: all names that data lists declare; shared: what is known everywhere;
+    settings: what a user has set, which variables of a call begin with too; types: components of
+    structures.
+
+    What the program didn't bring:
+    assumed: values by name or name[index]; chosen: the same of system variables that a function has
+    just found; noted: hears of those that are used; guesses: how many were; delivered: what is said
+    of figures of $config.dat that were used as controllers are delivered, and where first.
+
+    The advance run:
+    beside: what triggers have set since it stopped last; ahead: it is ahead of a motion since then;
+    watched: see `watch`.
     """
 
     shared: dict[str, Value]
+    scopes: list[Scope] = field(default_factory=list)
+    module: str = ""
+    modules: dict[str, dict[str, Value]] = field(default_factory=dict)
+    listed: set[str] = field(default_factory=set)
+    settings: dict[str, Value] = field(default_factory=dict)
+    types: dict[str, Mapping[str, str]] = field(default_factory=lambda: dict(TYPES))
+
     assumed: dict[str, Assumption] = field(default_factory=dict)
     chosen: dict[str, Assumption | None] = field(default_factory=dict)
     noted: Noted = lambda place, text, effect: None
     guesses: int = 0
-    watched: list[Watched] = field(default_factory=list)
-    scopes: list[Scope] = field(default_factory=list)
-    modules: dict[str, dict[str, Value]] = field(default_factory=dict)
-    module: str = ""
-    listed: set[str] = field(default_factory=set)
-    settings: dict[str, Value] = field(default_factory=dict)
+    delivered: dict[str, SourcePlace] = field(default_factory=dict)
+
     beside: set[str] = field(default_factory=set)
     ahead: bool = False
-    delivered: dict[str, SourcePlace] = field(default_factory=dict)
-    types: dict[str, Mapping[str, str]] = field(default_factory=lambda: dict(TYPES))
+    watched: list[Watched] = field(default_factory=list)
 
     def enter(self, values: dict[str, Value], names: Iterable[str]) -> None:
         """A call begins, with these parameters and their values."""
@@ -413,172 +419,3 @@ def _element(value: Value, name: str, index: tuple[int, ...] | None, place: Sour
         raise KrlRunError(f"{name} is no array: leave out the index", place)
     value.check(index, name, place)
     return value.elements.get(index, Unknown(written))
-
-
-# Inputs, outputs, flags and timers as a program reads them, single or as the number of a group.
-
-INPUT = "$IN"
-OUTPUT = "$OUT"
-OUTPUT_IN_TIME = "$OUT_C"  # the same, set when the motion before ends: no stop of the advance run
-TIMER = "$TIMER"
-TIMER_FLAG = "$TIMER_FLAG"
-CYCLIC = "$CYCFLAG"
-FLAG = "$FLAG"
-SINGLE = frozenset((INPUT, OUTPUT, TIMER_FLAG, FLAG, CYCLIC))
-"""What is TRUE or FALSE by its number."""
-SIGNALS = 8192
-"""A KR C4 has $OUT[1] to $OUT[8192], and as many inputs."""
-_GROUP_MAX = 32  # signals of a group: the bits of an INT
-
-
-@dataclass(frozen=True)
-class SignalRange:
-    """Signals from `first` to `last` of $IN or $OUT as one number, the first its lowest bit."""
-
-    kind: str
-    first: int
-    last: int
-
-    @property
-    def numbers(self) -> range:
-        """Its signals, the lowest bit first."""
-        return range(self.first, self.last + 1)
-
-
-@dataclass(frozen=True)
-class Pulse:
-    """A pulse of an output to `level` that lasts `left` s from here; moved: motions have passed
-    meanwhile, nobody knows how long.
-    """
-
-    level: bool
-    left: float
-    moved: bool = False
-
-
-@dataclass
-class Signals:
-    """What is known of signals. inputs: what $IN[n] reads; noted: hears what is assumed; stops:
-    hears what stops the advance run; expected: inputs that a WAIT FOR has waited for; aliases and
-    groups: what SIGNAL declares, by name; pulses: of outputs, that may still last; cyclic: what
-    gives cyclical flags their values anew.
-    """
-
-    memory: Memory
-    inputs: Mapping[int, bool]
-    noted: Noted
-    stops: Callable[[SourcePlace, str], None] = lambda place, name: None
-    expected: dict[int, bool] = field(default_factory=dict)
-    aliases: dict[str, tuple[Step, ...]] = field(default_factory=dict)
-    groups: dict[str, SignalRange] = field(default_factory=dict)
-    pulses: dict[int, Pulse] = field(default_factory=dict)
-    cyclic: dict[int, Callable[[], bool]] = field(default_factory=dict)
-
-    def pulse(self, index: int, pulse: Pulse, place: SourcePlace) -> None:
-        """PULSE has set an output: it goes back as time passes."""
-        self.memory.set(((OUTPUT, (index,)),), pulse.level, place)
-        self.pulses[index] = pulse
-
-    def moved(self) -> None:
-        """A motion, or a wait of unknown length, has passed."""
-        self.pulses = {n: replace(one, moved=True) for n, one in self.pulses.items()}
-
-    def stood(self, seconds: float, place: SourcePlace) -> None:
-        """A wait of known length has passed: pulses that it outlasts are over."""
-        for index, one in list(self.pulses.items()):
-            self.pulses[index] = replace(one, left=one.left - seconds)
-            if one.left <= seconds:
-                del self.pulses[index]
-                self.memory.set(((OUTPUT, (index,)),), not one.level, place)
-
-    def read(self, name: str, index: int, place: SourcePlace) -> bool:
-        """One signal or flag; what isn't known is FALSE. Raises KrlRunError."""
-        if name in (INPUT, OUTPUT):
-            self.stops(place, f"{name}[{index}]")
-        if name == INPUT:
-            return self._is_input(index, place)
-        if name == TIMER_FLAG:
-            self.stands_still(index, place)
-            return number(self._held(TIMER, index) or 0, f"$TIMER[{index}]", place) > 0.0
-        if name == CYCLIC and index in self.cyclic:
-            return self.cyclic[index]()
-        held = self._held(name, index)
-        if name == OUTPUT and index in self.pulses and self.pulses[index].moved:
-            self.memory.guesses += 1
-            text = f"the PULSE of $OUT[{index}] may be over after motions: taken as lasting"
-            self.noted(place, text, Effect.MOTIONS)
-        if held is None:
-            self.memory.guesses += 1
-            self.noted(place, f"{name}[{index}] was never set: taken as FALSE", Effect.MOTIONS)
-            return False
-        if not isinstance(held, bool):
-            raise KrlRunError(f"{name}[{index}] isn't TRUE or FALSE", place)
-        if name == CYCLIC:
-            self.memory.guesses += 1
-            text = f"{name}[{index}] is taken as it was when it was set, not evaluated anew"
-            self.noted(place, text, Effect.MOTIONS)
-        return held
-
-    def stands_still(self, index: int, place: SourcePlace) -> None:
-        """A timer is read: its time doesn't pass."""
-        self.memory.guesses += 1
-        text = f"$TIMER[{index}] stands still: no time passes for a timer"
-        self.noted(place, text, Effect.MOTIONS)
-
-    def _is_input(self, index: int, place: SourcePlace) -> bool:
-        if index in self.inputs:
-            return self.inputs[index]
-        if index in self.expected:
-            return self.expected[index]
-        self.memory.guesses += 1
-        text = f"$IN[{index}] isn't given: taken as FALSE; --input {index}=true"
-        self.noted(place, text, Effect.MOTIONS)
-        return False
-
-    def group_value(self, name: str, place: SourcePlace) -> int:
-        """The number of a group."""
-        group = self.groups[name]
-        return sum(self.read(group.kind, n, place) << k for k, n in enumerate(group.numbers))
-
-    def group_bits(self, name: str, value: Value, place: SourcePlace) -> list[tuple[int, bool]]:
-        """Outputs of a group and what they are set to. Raises KrlRunError for a number that it
-        can't hold.
-        """
-        group = self.groups[name]
-        wanted = integer(value, f"what {name} is set to", place)
-        if group.kind != OUTPUT:
-            raise KrlRunError(f"{name} is a group of inputs: it can't be set", place)
-        if not 0 <= wanted < 1 << len(group.numbers):
-            raise KrlRunError(
-                f"{name} has {len(group.numbers)} bits: it can't hold {wanted}", place
-            )
-        return [(n, bool(wanted >> k & 1)) for k, n in enumerate(group.numbers)]
-
-    def declare(
-        self, name: str, first: tuple[Step, ...], last: tuple[Step, ...] | None, place: SourcePlace
-    ) -> None:
-        """SIGNAL name first [TO last]. Raises KrlRunError for a group that makes no sense."""
-        if last is None:
-            self.aliases[name] = first
-            return
-        (kind, begin), (other, end) = first[0], last[0]
-        there = kind == other and kind in (INPUT, OUTPUT) and begin is not None and end is not None
-        if not there or begin is None or end is None or not 0 <= end[0] - begin[0] < _GROUP_MAX:
-            raise KrlRunError(
-                f"{name} must be a group of 1 to {_GROUP_MAX} inputs or outputs", place
-            )
-        self.groups[name] = SignalRange(kind, begin[0], end[0])
-
-    @property
-    def named(self) -> dict[str, SignalRange]:
-        """What the names of signals stand for; one signal is a range of one."""
-        single = {
-            name: SignalRange(path[0][0], path[0][1][0], path[0][1][0])
-            for name, path in self.aliases.items()
-            if path[0][1] is not None
-        }
-        return single | self.groups
-
-    def _held(self, name: str, index: int) -> Value | None:
-        array = self.memory.shared.get(name)
-        return array.elements.get((index,)) if isinstance(array, Array) else None

@@ -25,18 +25,9 @@ from ir_krl.run.commands import (
 )
 from ir_krl.run.control_flow import Clock, Control
 from ir_krl.run.expressions import Expressions
-from ir_krl.run.memory import (
-    CYCLIC,
-    INPUT,
-    OUTPUT,
-    OUTPUT_IN_TIME,
-    SIGNALS,
-    TIMER,
-    Memory,
-    Noted,
-    Pulse,
-)
+from ir_krl.run.memory import Memory, Noted
 from ir_krl.run.notes import Effect
+from ir_krl.run.signals import CYCLIC, INPUT, OUTPUT, OUTPUT_IN_TIME, SIGNALS, TIMER, Pulse
 from ir_krl.run.standing import Standing
 from ir_krl.run.system import (
     AXES,

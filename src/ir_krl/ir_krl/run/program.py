@@ -12,9 +12,10 @@ from ir_krl.run.built_in import COMPUTED, CONTROLLERS, FILLING, STOPPING, Librar
 from ir_krl.run.commands import Command
 from ir_krl.run.control_flow import Endless, Jump, LoopExit, Returned
 from ir_krl.run.expressions import Expressions
-from ir_krl.run.memory import Memory, SignalRange, Signals, module_of
+from ir_krl.run.memory import Memory, module_of
 from ir_krl.run.motions import Motions, Moving
 from ir_krl.run.notes import Effect, Note, worst_first
+from ir_krl.run.signals import SignalRange, Signals
 from ir_krl.run.standing import AXES_NOW, PLACE_NOW, Kinematics, Standing
 from ir_krl.run.system import AXES, Assumption, assumed_variables, form_age, system_variables
 from ir_krl.run.texts import TEXT_FUNCTIONS, text_value
@@ -130,7 +131,7 @@ def follow(
         there = ", ".join(routines.names[:8]) or "none"
         raise KrlRunError(f"there is no routine {name or 'at all'}; routines: {there}")
     forms = form_age({one for source in sources for one in source.versions})
-    memory = Memory(system_variables(home, tool, forms), assumed_variables(forms))
+    memory = Memory(system_variables(home, tool, forms), assumed=assumed_variables(forms))
     for source in sources:
         for body in (*source.data, *(one.body for one in source.routines)):
             memory.types |= _structures(body)
