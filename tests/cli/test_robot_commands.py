@@ -162,15 +162,15 @@ def test_tighter_capsules_are_taken_unless_they_leave_fewer_postures(
     path.write_text(robot_urdf(load_robot("ur10e")))
     fits: list[Shapes] = []
 
-    def fitted(*given: object) -> Shapes:
-        some = capsules_of(*given[:4])  # type: ignore[arg-type]
+    def fitted(*given: object, **tighter: object) -> Shapes:
+        some = capsules_of(*given)  # type: ignore[arg-type]
         extra = replace(some.capsules[-1], name="extra")
-        last = (*some.capsules, extra) if len(given) > 4 else some.capsules
+        last = (*some.capsules, extra) if tighter else some.capsules
         fits.append(Shapes(last, some.sentences))
         return fits[-1]
 
-    def paired(*given: object) -> Pairs:
-        return Pairs((), (), frozenset({(4, 6)}), left if len(given) > 6 else 0.4)
+    def paired(*given: object, **tighter: object) -> Pairs:
+        return Pairs((), (), frozenset({(4, 6)}), left if tighter else 0.4)
 
     monkeypatch.setattr(robot_from_urdf, "capsules_of", fitted)
     monkeypatch.setattr(robot_from_urdf, "pairs_of", paired)

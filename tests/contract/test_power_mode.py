@@ -131,6 +131,6 @@ def test_the_report_has_a_colour_for_it(row: ModeRow) -> None:
 
 
 def test_a_row_that_is_forgotten_elsewhere_is_noticed() -> None:
-    forgotten = replace(MODES[-1], bit="nap")
+    forgotten = MODES[-1]._replace(bit="nap")
     with pytest.raises(ValueError, match="nap"):
         test_its_bit_is_an_input_that_a_plc_can_set(forgotten)

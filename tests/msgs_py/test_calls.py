@@ -109,6 +109,6 @@ def test_a_message_beyond_the_bound_is_left_out_before_it_is_copied(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     most = GetCell.Response(cell_yaml="x" * (MOST_BYTES - 2000))
-    assert MOST_BYTES - 2000 < len(calls._bounded(most)) <= MOST_BYTES
+    assert MOST_BYTES - 2000 < len(calls._bounded_cdr(most)) <= MOST_BYTES
     monkeypatch.setattr(calls, "serialize_message", lambda message: pytest.fail("it was copied"))
-    assert len(calls._bounded(GetCell.Response(cell_yaml="x" * MOST_BYTES))) == 0
+    assert len(calls._bounded_cdr(GetCell.Response(cell_yaml="x" * MOST_BYTES))) == 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, astuple, replace
+from dataclasses import astuple, replace
 from typing import cast
 
 import numpy as np
@@ -81,7 +81,7 @@ def test_what_programs_are_compared_by_is_what_they_are_reported_with(
         ]
         assert costs[0] == costs[1]
     for movement in common.found.values():
-        for name, value in asdict(movement.consumption).items():
+        for name, value in movement.consumption._asdict().items():
             assert getattr(movement.report, name) == value
 
 
