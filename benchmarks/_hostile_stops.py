@@ -49,7 +49,7 @@ STANDING = 3  # messages, 60 ms, in which a robot that stands does not turn
 ROLLS = 250  # messages, 5 s, in which a stopped robot has to stand
 PATIENCE = 30.0
 BACK = 1.5  # s of the goal that brings the robot home
-PLC = ("conf_mess", "drives_on", "drives_off", "move_enable", "ab", "end_rest", "aut")
+PLC = ("conf_mess", "drives_on", "drives_off", "move_enable", "ab", "end_rest", "AUT")
 SHORT = {
     "joint_state_rate": 50,
     "modbus_idle": "3600.0",  # the ways are drawn: on a busy machine none is silent for too long
@@ -270,7 +270,7 @@ class Cell:
 
     def rest(self) -> None:
         """All bits as they are without a PLC."""
-        self.write("ext", True)
+        self.write("EXT", True)
         levels = PlcInputs(move_enable=True)
         self.driver.client._executor.run(lambda: self._plc.publish(levels))
         self.write("emergency_stop", False)
@@ -339,7 +339,8 @@ def episode(cell: Cell, generator: random.Random) -> None:
     """Press, release and recover once, amid whatever comes; raises BrokenLawError."""
     cell.goals = []
     # one of the two that recover together, so that only a person does
-    bits = tuple(bit for bit in PLC if bit != generator.choice(("conf_mess", "drives_on")))
+    kept_from_the_plc = generator.choice(("conf_mess", "drives_on"))
+    bits = tuple(bit for bit in PLC if bit != kept_from_the_plc)
     _press(cell, generator, bits)
     if generator.random() < 0.7:
         _events(cell, generator, bits)
