@@ -77,8 +77,10 @@ class Stream:
 
     def take(self) -> Iterator[bytes]:
         """All that have come, oldest first."""
-        while (taken := take_bytes(self._subscription)) is not None:
+        taken = take_bytes(self._subscription)
+        while taken is not None:
             yield taken[0]
+            taken = take_bytes(self._subscription)
 
 
 def after_header(data: bytes) -> int:

@@ -149,7 +149,8 @@ def urdf_arm(text: str, source: str, tip: str = "", without: Collection[str] = (
     Raises RobotFileError where it has not six turning axes.
     """
     read = urdf_tree(text, source)
-    whole, rounding = _right_angles(_joints_to(read, _tip(read, tip, source), source))
+    end = _tip(read, tip, source)
+    whole, rounding = _right_angles(_joints_to(read, end, source))
     under, path = _on_rail(whole, source)
     moving = _axes(path, source, under)
     tree = replace(read, above={**read.above, **{joint.child: joint for joint in path}})
